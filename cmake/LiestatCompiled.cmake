@@ -6,7 +6,8 @@
 #   fusion         the estimators of fusion/, but for those of trajectories (Random123)
 #   trajectories   evaluation and conversion of trajectories, diagnosis of conventions, inertial windows against a truth
 #                  (Boost.Math, Random123)
-#   formats        readers and writers of files (Boost.Math, {fmt}, zlib, yaml-cpp, nlohmann/json)
+#   formats        readers and writers of files (Boost.Math, {fmt}, zlib, yaml-cpp, nlohmann/json; bags of ROS also use bzip2,
+#                  lz4, zstd, SQLite)
 
 set(LIESTAT_COMPILED_PARTS means estimation fusion trajectories formats)
 
@@ -21,6 +22,8 @@ set(LIESTAT_COMPILED_SOURCES_trajectories
 set(LIESTAT_COMPILED_NEEDS_fusion random123)
 set(LIESTAT_COMPILED_NEEDS_trajectories boost random123)
 set(LIESTAT_COMPILED_NEEDS_formats boost fmt json yaml zlib)
+# What it uses if it is there: a definition LIESTAT_HAS_<NAME> tells its sources.
+set(LIESTAT_COMPILED_OPTIONAL_formats bz2 lz4 zstd sqlite_library)
 # Parts that a part links.
 set(LIESTAT_COMPILED_USES_fusion estimation)
 
@@ -96,6 +99,13 @@ function(liestat_compiled part root library)
   if(part STREQUAL "formats")
     # No header of formats/ includes them.
     target_link_libraries(${target} PUBLIC ${library} PRIVATE ${packages})
+    foreach(name IN LISTS LIESTAT_COMPILED_OPTIONAL_${part})
+      if(TARGET liestat_${name})
+        string(TOUPPER LIESTAT_HAS_${name} has)
+        target_link_libraries(${target} PRIVATE liestat_${name})
+        target_compile_definitions(${target} PRIVATE ${has})
+      endif()
+    endforeach()
   else()
     target_link_libraries(${target} PUBLIC ${library} ${packages})
   endif()

@@ -9,9 +9,11 @@
 #include <unordered_map>
 #include <utility>
 
+#include <formats/bag.hpp>
 #include <formats/detail/feature_columns.hpp>
 #include <formats/detail/feature_formats.hpp>
 #include <formats/detail/rows.hpp>
+#include <formats/detail/trajectory_formats.hpp>
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
 #include <formats/detail/rotation_matrix.hpp>
@@ -307,9 +309,29 @@ class FeatureReader {
   std::vector<double> values_;
 };
 
+/// The poses of a topic.
+FeatureFile featuresOfBag(const std::string& path, const ReadingOptions& options) {
+  TrajectoryOptions how;
+  how.reading = options;
+  const Trajectory t = detail::readBagTrajectory(path, how);
+  FeatureFile file;
+  file.kind = Feature::frame, file.format = t.format, file.times = t.times, file.lines = t.lines;
+  for (const SE3d& pose : t.poses) {
+    file.rotations.push_back(pose.unit_quaternion()), file.positions.push_back(pose.translation());
+  }
+  file.n_normalised = t.n_normalised, file.largest_norm_error = t.largest_norm_error, file.notes = t.notes;
+  if (t.hasCovariances()) {
+    file.notes.emplace_back(
+        "the messages' covariances are not used; `liestat convert BAG:TOPIC OUT.csv --cov-from "
+        "ros-fixed` writes a file whose covariances are");
+  }
+  return file;
+}
+
 }  // namespace
 
 FeatureFile readFeatureFile(const std::string& path, const ReadingOptions& options) {
+  if (isBag(path)) return featuresOfBag(path, options);
   const TextFile file = loadText(path, options.largest_file);
   return readFeatures(file.text, file.name, options);
 }

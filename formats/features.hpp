@@ -47,6 +47,7 @@ struct FeatureFile {
   std::size_t n_beyond_half_turn = 0;   ///< rotation vectors longer than a half-turn, which no logarithm is
   double largest_rotation_vector = 0;   ///< rad
   std::string format;                   ///< the name of the format that was read
+  std::vector<std::string> notes;       ///< sentences on what reading has decided
 
   std::size_t size() const { return lines.size(); }
 };
@@ -76,7 +77,8 @@ struct ReadingOptions {
 /// The names of the formats that are known (formats/feature_formats.cpp), `auto` first.
 std::vector<std::string> formatNames();
 
-/// Reads features from a file, `-` is standard input. Throws InputError.
+/// Reads features from a file, `-` is standard input, or poses from a topic of a bag (docs/bags.md), whose covariances
+/// are left out, since nothing says what they mean. Throws InputError.
 FeatureFile readFeatureFile(const std::string& path, const ReadingOptions& options = {});
 
 /// Reads features from memory; `name` stands for the file in messages. Throws InputError.

@@ -6,6 +6,10 @@
 #include <cmath>
 #include <utility>
 
+#include <formats/bag.hpp>
+#include <formats/detail/bag_file.hpp>
+#include <formats/detail/bag_messages.hpp>
+#include <formats/detail/trajectory_formats.hpp>
 #include <formats/input_error.hpp>
 #include <formats/detail/rows.hpp>
 #include <formats/numeric_table.hpp>
@@ -42,6 +46,76 @@ void checkUnits(const ImuFile& file, const std::string& name) {
   }
 }
 
+/// A topic of Imu messages.
+ImuFile readBagImu(const std::string& path) {
+  const BagPath at = bagPath(path);
+  std::string name = sourceName(path);
+  detail::BagPass pass;
+  std::vector<std::string> found;
+  std::vector<std::pair<std::int64_t, ImuSample<double>>> readings;
+  std::size_t stated = 0, repeated = 0;
+  pass.wanted = [&](const BagTopic& b) {
+    const bool is_imu =
+        detail::bagTypeOf(b.type) == detail::BagType::imu && (b.encoding == "ros1" || b.encoding == "cdr");
+    if (at.topic.empty() ? !is_imu : b.name != at.topic) return false;
+    if (!is_imu) {
+      throw InputError(name, 0, fmt::format("messages of type {} in {}", printable(b.type), printable(b.encoding)),
+                       "sensor_msgs/Imu");
+    }
+    if (found.empty() || found.back() != b.name) found.push_back(b.name);
+    return found.size() == 1;
+  };
+  pass.take = [&](const BagTopic& b, std::int64_t, std::string_view data) {
+    const std::size_t number = readings.size() + 1;
+    const detail::BagImu imu = detail::imuOf(b, data, name, number);
+    if (imu.rate_covariance[0] == -1 || imu.force_covariance[0] == -1) {
+      throw InputError(name, number,
+                       fmt::format("the sensor has no {}: their covariance begins with -1",
+                                   imu.rate_covariance[0] == -1 ? "angular rates" : "accelerations"),
+                       "a sensor of both");
+    }
+    if (!imu.rate.allFinite() || !imu.force.allFinite()) {
+      throw InputError(name, number, "a reading is not finite", "rad/s and m/s^2");
+    }
+    if ((imu.rate_covariance.array() != 0).any() || (imu.force_covariance.array() != 0).any()) ++stated;
+    readings.emplace_back(imu.stamp_ns, ImuSample<double>{0, imu.rate, imu.force});
+  };
+  detail::readBagFile(at.file, largest_text, pass);
+  if (found.empty()) detail::requireBagTopic(name, at.topic.empty() ? "of sensor_msgs/Imu" : at.topic, pass.topics);
+  if (found.size() > 1) {
+    throw InputError(name, 0, fmt::format("{} topics of inertial readings", found.size()),
+                     "one of them after a colon: " + joined(found, ", "));
+  }
+  ImuFile file;
+  file.format = "bag", file.notes = pass.notes;
+  const auto before = [](const auto& a, const auto& b) { return a.first < b.first; };
+  if (!std::is_sorted(readings.begin(), readings.end(), before)) {
+    file.notes.emplace_back("the messages are not in the order of their stamps: sorted");
+    std::stable_sort(readings.begin(), readings.end(), before);
+  }
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    auto& [stamp, sample] = readings[i];
+    if (i == 0) file.start_ns = stamp;
+    sample.time = 1e-9 * static_cast<double>(stamp - file.start_ns);
+    if (i > 0 && stamp == readings[i - 1].first && sample.angular_rate == file.samples.back().angular_rate &&
+        sample.specific_force == file.samples.back().specific_force) {
+      ++repeated;
+      continue;
+    }
+    file.samples.push_back(sample), file.lines.push_back(i + 1);
+  }
+  if (repeated > 0) file.notes.push_back(fmt::format("{} messages repeat the one before: dropped", repeated));
+  if (stated > 0) {
+    file.notes.push_back(fmt::format(
+        "{} messages state covariances, which are not used: densities of noise are those of --noise or --calibration",
+        stated));
+  }
+  if (file.samples.size() < 2) throw InputError(name, 0, "there is one reading at most", "two at least");
+  checkOrder(file, name);
+  checkUnits(file, name);
+  return file;
+}
+
 }  // namespace
 
 ImuFile parseImu(std::string_view text, const std::string& name) {
@@ -76,6 +150,7 @@ ImuFile parseImu(std::string_view text, const std::string& name) {
 }
 
 ImuFile readImu(const std::string& path) {
+  if (isBag(path)) return readBagImu(path);
   const TextFile file = loadText(path);
   return parseImu(file.text, file.name);
 }

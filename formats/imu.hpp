@@ -15,18 +15,21 @@ namespace liestat {
 /// The readings of an inertial sensor out of a file.
 struct ImuFile {
   std::vector<ImuSample<double>> samples;  ///< in the order of time, which is in seconds since `start_ns`
-  std::vector<std::size_t> lines;          ///< the line that each stands in
+  std::vector<std::size_t> lines;          ///< the line, or in bags the message, that each stands in
   /// The first time stamp, in nanoseconds: those of a clock that counts from 1970 do not fit into a double. Zero where
   /// the file has seconds.
   std::int64_t start_ns = 0;
-  std::string format;  ///< euroc or csv
+  std::string format;              ///< euroc, csv or bag
+  std::vector<std::string> notes;  ///< sentences on what reading has decided
 
   double duration() const { return samples.back().time - samples.front().time; }
 };
 
 /// Reads `#timestamp [ns],w x y z [rad/s],a x y z [m/s²]` (EuRoC, TUM-VI), or a CSV file with the columns t (s), wx,
-/// wy, wz, ax, ay, az; `-` is standard input. Throws InputError, also where times do not ascend and where the numbers
-/// are those of other units: forces of some 1 (g), rates of hundreds (degrees a second).
+/// wy, wz, ax, ay, az; `-` is standard input; or a topic of sensor_msgs/Imu in a bag (`run.bag:/imu`, or the only one),
+/// in the order of its stamps, of which rates and forces alone are taken. Throws InputError, also where times do not
+/// ascend, where a topic says that it has no rates or forces (-1 as a covariance), and where the numbers are those of
+/// other units: forces of some 1 (g), rates of hundreds (degrees a second).
 ImuFile readImu(const std::string& path);
 /// The same from memory.
 ImuFile parseImu(std::string_view text, const std::string& name);

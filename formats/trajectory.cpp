@@ -1,5 +1,6 @@
 #include <formats/trajectory.hpp>
 
+#include <formats/bag.hpp>
 #include <formats/detail/feature_formats.hpp>
 #include <formats/detail/rows.hpp>
 #include <formats/detail/trajectory_formats.hpp>
@@ -168,11 +169,16 @@ Trajectory parseTrajectory(std::string_view text, std::string name, const Trajec
 }
 
 Trajectory readTrajectory(const std::string& path, const TrajectoryOptions& options) {
-  return readTrajectory(path, loadText(path, options.reading.largest_file), options);
+  return readTrajectory(path, loadTrajectoryText(path, options.reading.largest_file), options);
+}
+
+TextFile loadTrajectoryText(const std::string& path, std::optional<double> largest) {
+  return isBag(path) ? TextFile{sourceName(path), {}} : loadText(path, largest);
 }
 
 Trajectory readTrajectory(const std::string& path, const TextFile& file, const TrajectoryOptions& options) {
-  Trajectory trajectory = parseTrajectory(file.text, file.name, options);
+  Trajectory trajectory = file.text.empty() && isBag(path) ? detail::readBagTrajectory(path, options)
+                                                           : parseTrajectory(file.text, file.name, options);
   std::string side = options.covariance_file;
   std::error_code ignored;
   if (side.empty() && options.side_file && path != "-" && std::filesystem::exists(path + ".cov", ignored)) {

@@ -82,14 +82,20 @@ struct TrajectoryOptions {
   /// The unit of the stamps in formats that leave it open. Nothing: seconds, unless all of them lie beyond the year
   /// 5000 and are stamps since 1970 in ms, us or ns.
   std::optional<StampUnit> time_unit;
+  /// Of a bag without a topic, or with the topic /tf: `map:base_link` takes the pose of base_link in map by the chain of
+  /// transforms between the two.
+  std::string frames;
   ReadingOptions reading;  ///< norms, CSV columns, size; its format is not used
 };
 
-/// The names of the formats, `auto` first. Some are only read: matrix, colmap, g2o and toro (their vertices).
+/// The names of the formats, `auto` first. Some are only read: matrix, colmap, g2o and toro (their vertices), bag.
 std::vector<std::string> trajectoryFormatNames(bool with_read_only = true);
 
-/// Reads poses, and covariances if there are any, from a file; `-` is standard input. Throws InputError.
+/// Reads poses, and covariances if there are any, from a file, `-` is standard input, or from a topic of a bag
+/// (`run.bag:/odom`, docs/bags.md), whose lines are numbers of messages. Throws InputError.
 Trajectory readTrajectory(const std::string& path, const TrajectoryOptions& options = {});
+/// The text of a file of poses, none of a bag, which is read where it lies.
+TextFile loadTrajectoryText(const std::string& path, std::optional<double> largest = {});
 /// The same of a file whose text has been loaded, such as a pipe, which can be read only once.
 Trajectory readTrajectory(const std::string& path, const TextFile& file, const TrajectoryOptions& options);
 /// The same from memory, without side file; `name` stands for the file in messages.

@@ -1,5 +1,6 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/reading_options.hpp>
+#include <formats/bag.hpp>
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
 #include <formats/output_file.hpp>
@@ -7,6 +8,7 @@
 #include <formats/text.hpp>
 #include <formats/trajectory.hpp>
 #include <report/json.hpp>
+#include <report/publish.hpp>
 #include <fusion/trajectory_conversion.hpp>
 #include <stats/convention_presets.hpp>
 
@@ -29,7 +31,7 @@ struct ConvertOptions {
   std::string input, output, to, cov_from, cov_to, times, json;
   TrajectoryOptions reading;
   std::optional<DuplicateRule> duplicates;
-  bool assume_uncorrelated = false, sampled = false;
+  bool assume_uncorrelated = false, sampled = false, list = false;
   int samples = 2000;
   std::uint64_t seed = 1;
 };
@@ -179,9 +181,30 @@ void convertGraph(const ConvertOptions& options, ConvertOutput& output, const Te
   writeConverted(options, output, text, {});
 }
 
+/// The topics of a bag as a table.
+std::string formatTopics(const BagContents& bag) {
+  std::size_t name = 5, type = 4;
+  for (const BagTopic& t : bag.topics) name = std::max(name, t.name.size()), type = std::max(type, t.type.size());
+  std::string text = fmt::format("{:{}}  {:{}}  {:8}  {:>9}  {:>20}  {:>10}\n", "topic", name, "type", type, "encoding",
+                                 "messages", "first (s)", "span (s)");
+  for (const BagTopic& t : bag.topics) {
+    text += fmt::format("{:{}}  {:{}}  {:8}  {:>9}  {:>20.9f}  {:>10.3f}\n", t.name, name, t.type, type,
+                        printable(t.encoding), t.messages, 1e-9 * static_cast<double>(t.first_ns),
+                        1e-9 * static_cast<double>(t.last_ns - t.first_ns));
+  }
+  for (const std::string& note : bag.notes) text += "note: " + note + "\n";
+  return text;
+}
+
 int runConvert(const ConvertOptions& options, const Invocation& invocation) {
+  if (options.list) {
+    const BagContents bag = listBag(options.input, options.reading.reading.largest_file);
+    publishResult(options.json, formatTopics(bag), invocation.command_line, std::nullopt, bag);
+    return exit_fine;
+  }
+  if (options.output.empty()) throw OptionError(convert_name, "OUT is missing", "IN OUT, or IN --list for a bag");
   ConvertOutput output;
-  const TextFile file = loadText(options.input, options.reading.reading.largest_file);
+  const TextFile file = loadTrajectoryText(options.input, options.reading.reading.largest_file);
   const bool is_graph = named<GraphFormat>(options.reading.format).has_value() ||
                         (options.reading.format == "auto" && looksLikeGraph(file.text));
   // A graph in the format of a trajectory is its vertices.
@@ -213,8 +236,10 @@ void addConvertCommand(const CommandList& program) {
   auto options = std::make_shared<ConvertOptions>();
   const Command command =
       program.add("convert", "Poses with covariances between the formats and conventions of other programs");
-  command.option("IN", options->input, "Trajectory, or graph of g2o or TORO ('-': standard input)").required();
-  command.option("OUT", options->output, "The result ('-': standard output); covariances may go to OUT.cov").required();
+  command.option("IN", options->input, "Trajectory, graph of g2o or TORO, or BAG:TOPIC ('-': standard input)")
+      .required();
+  command.option("OUT", options->output, "The result ('-': standard output); covariances may go to OUT.cov");
+  command.flag("--list", options->list, "List the topics of the bag IN: types, counts, spans; no OUT");
   command.option("--from", options->reading.format, "Format of IN (default auto: by its first lines)")
       .oneOf(trajectoryFormatNames());
   std::vector<std::string> written = trajectoryFormatNames(false);

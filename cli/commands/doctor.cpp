@@ -92,7 +92,9 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
   }
   if (!has_truth && estimates.size() > 1) throw OptionError(doctor_name, "several estimates", "one without a truth");
   std::vector<DiagnosedRun> runs;
-  const auto load = [&](const std::string& path) { return loadText(path, o.input.estimate.reading.largest_file); };
+  const auto load = [&](const std::string& path) {
+    return loadTrajectoryText(path, o.input.estimate.reading.largest_file);
+  };
   TextFile text = load(estimates.front());
   const std::string& format = o.input.estimate.format;
   if (named<GraphFormat>(format) || (format == "auto" && looksLikeGraph(text.text))) {

@@ -1,5 +1,6 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/trajectory_input.hpp>
+#include <formats/bag.hpp>
 #include <formats/evo_result.hpp>
 #include <formats/input_error.hpp>
 #include <formats/output_file.hpp>
@@ -51,7 +52,7 @@ std::vector<std::string> namesOf(const std::vector<std::string>& paths) {
   std::vector<std::string> names;
   for (std::size_t k = 0; k < paths.size(); ++k) {
     const std::string path = "/" + paths[k];
-    std::size_t begin = path.rfind('/');
+    std::size_t begin = path.rfind('/', bagPath(paths[k]).file.size());  // a bag's topic has a stroke of its own
     const auto alone = [&] {
       const std::string_view end = std::string_view(path).substr(begin);
       return std::count_if(paths.begin(), paths.end(), [&](const auto& p) { return ("/" + p).ends_with(end); }) == 1;
@@ -201,7 +202,8 @@ void addEvaluateCommand(const CommandList& program) {
   auto o = std::make_shared<EvaluateOptions>();
   const Command command =
       program.add("evaluate", "Trajectories against a reference: APE, RPE, and are the covariances right?");
-  command.option("REFERENCE", o->reference, "Ground truth: TUM, KITTI, EuRoC, CSV … ('-': standard input)").required();
+  command.option("REFERENCE", o->reference, "Ground truth: TUM, KITTI, EuRoC, CSV, BAG:TOPIC … ('-': standard input)")
+      .required();
   command.option("ESTIMATE", o->estimates, "Estimates, any number of them").required();
   command.option("--cov-from", o->cov_from, "Convention of the estimates' covariances: ros-fixed, left,order=rt …");
   command.option("--cov-ref", o->cov_ref,

@@ -40,7 +40,9 @@ struct ImuOptions {
 /// Declares --imu, --noise, both biases, --scheme and --max-gap. `bias` says what a bias is taken for that is not
 /// given.
 inline void addImuOptions(const Command& command, ImuOptions& options, const std::string& bias) {
-  command.option("--imu", options.file, "EuRoC's imu0/data.csv, or CSV with t,wx,wy,wz,ax,ay,az ('-': standard input)")
+  command
+      .option("--imu", options.file,
+              "EuRoC's imu0/data.csv, CSV with t,wx,wy,wz,ax,ay,az ('-': standard input), or BAG:TOPIC of Imu messages")
       .required();
   command
       .option("--noise", options.noise,

@@ -33,6 +33,7 @@ Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& opti
   if (!rows.parts.contains(feature.parts)) {
     refuse(fmt::format("--feature {} does not fit a file of {}", feature.name, rows.plural));
   }
+  m.notes = file.notes;
   if (!file.covariances.empty() && !(rows.parts == feature.parts)) {
     m.notes.push_back(fmt::format("the file's covariances are those of whole {} and are not used", rows.plural));
     file.covariances.clear(), file.factors.clear(), file.unmeasured.clear();

@@ -57,12 +57,13 @@ int runCommand(const Options& options, const Invocation& invocation) {
         fmt::format("once to {:g} times", max_windows));
   }
   const RecordingWindows result = preintegrateWindows(imu.samples, intervals, truth, how);
-  publishResult(options.json, formatPreintegration(result), invocation.command_line, std::nullopt,
-                [&](JsonObject& object) {
-                  object("file", options.imu.file)("format", imu.format)("readings", imu.samples.size())("start_ns",
-                                                                                                         imu.start_ns);
-                  object.fieldsOf(result);
-                });
+  std::string text = formatPreintegration(result);
+  for (const std::string& note : imu.notes) text += "note: " + note + "\n";
+  publishResult(options.json, text, invocation.command_line, std::nullopt, [&](JsonObject& object) {
+    object("file", options.imu.file)("format", imu.format)("readings", imu.samples.size())("start_ns", imu.start_ns);
+    object("reading_notes", imu.notes);
+    object.fieldsOf(result);
+  });
   if (!options.report.empty()) {
     PreintegratedReadings readings{imu, options.imu.file, begin, end, options.imu.largest_gap, noise};
     const auto first = std::find_if(result.windows.begin(), result.windows.end(), [](const auto& w) { return w.ok(); });

@@ -38,6 +38,8 @@ void declareReading(const Command& command, TrajectoryOptions& reading, std::opt
       .option("--unmeasured-above", reading.unmeasured,
               "Variances in messages from which on a component is not measured (default 90000)")
       .positive();
+  command.option("--frames", reading.frames,
+                 "Of bags without a topic: map:base_link, the pose of base_link in map by /tf and /tf_static");
   command.choice("--time-unit", reading.time_unit,
                  "Unit of stamps that are no seconds (default s; stamps since 1970 are recognised)");
   command.choice("--duplicates", duplicates,

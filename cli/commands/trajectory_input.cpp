@@ -42,7 +42,7 @@ void TrajectoryInputOptions::declare(const Command& command) {
 void TrajectoryInputOptions::settle() {
   std::vector<std::string> columns = std::move(reference.reading.columns);
   reference.reading = estimate.reading, reference.reading.columns = std::move(columns);
-  reference.unmeasured = estimate.unmeasured;
+  reference.unmeasured = estimate.unmeasured, reference.frames = estimate.frames;
   for (const double value : {association.offset, association.start.value_or(0), association.end.value_or(0)}) {
     if (!std::isfinite(value)) throw OptionError("liestat", "a time that is not finite", "seconds");
   }
@@ -50,7 +50,7 @@ void TrajectoryInputOptions::settle() {
 
 Trajectory readTimedTrajectory(const std::string& path, const TrajectoryOptions& options,
                                std::optional<DuplicateRule> duplicates) {
-  return readTimedTrajectory(path, loadText(path, options.reading.largest_file), options, duplicates);
+  return readTimedTrajectory(path, loadTrajectoryText(path, options.reading.largest_file), options, duplicates);
 }
 
 Trajectory readTimedTrajectory(const std::string& path, const TextFile& file, const TrajectoryOptions& options,

@@ -203,6 +203,7 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
   if (result.noise_calibration && result.noiseIsVerified()) text += "\n" + noiseInWords(*result.noise_calibration);
   if (result.show_filter_start) text += "\n" + filterStartInWords(result.filter_start);
   for (const std::string& note : result.notes()) text += "note: " + note + "\n";
+  for (const std::string& note : recording.imu.notes) text += "note: " + note + "\n";
   std::vector<std::string> notes;
   if (recording.tracks.seen_once > 0) {
     notes.push_back(fmt::format("{} tracks were seen once", recording.tracks.seen_once));

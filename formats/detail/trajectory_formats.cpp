@@ -18,7 +18,7 @@ namespace liestat::detail {
 // Each pair is in a source of its own, formats/detail/trajectory_*.cpp.
 TrajectoryReader readTum, readOpenVins, readKitti, readEuroc, readCsv;
 TrajectoryWriter writeTum, writeOpenVins, writeKitti, writeEuroc, writeCsv;
-TrajectoryReader readMatrices, readColmap, readVertices;
+TrajectoryReader readMatrices, readColmap, readVertices, readBag;
 TrajectoryReader readRosCsv, readRosJson, readRosYaml, readMavlinkCsv, readMavlinkJson;
 TrajectoryWriter writeRosCsv, writeRosJson, writeRosYaml, writeMavlinkCsv, writeMavlinkJson;
 
@@ -125,6 +125,13 @@ constexpr TrajectoryFormat trajectory_formats[] = {
      .write = nullptr,
      .times = TrajectoryTimes::none,
      .covariances = CovariancePlace::side_file},
+    // Recognised by bytes that are no text, before any of these are asked (isBag).
+    {.name = "bag",
+     .recognises = [](const Beginning&) { return false; },
+     .read = readBag,
+     .write = nullptr,
+     .time_decimals = 9,
+     .layout = CovarianceLayout::full36},
     // Whatever has a header; the reader of features names what it cannot read.
     {.name = "csv",
      .recognises = [](const Beginning& b) { return b.numbers == 0; },

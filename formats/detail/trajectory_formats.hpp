@@ -1,6 +1,7 @@
 // Formats of trajectories: one row each in formats/detail/trajectory_formats.cpp, reader and writer in a source of its own.
 #pragma once
 
+#include <formats/bag.hpp>
 #include <formats/trajectory.hpp>
 
 #include <cstddef>
@@ -111,6 +112,12 @@ struct TrajectoryFormat {
 /// Reads poses as features (formats/features.hpp), in the format of that name; times and, where a header names columns,
 /// covariances.
 void readAsFeatures(const TrajectorySource& source, Trajectory& trajectory);
+
+/// Poses of a bag: a topic of poses, or the chain of transforms that the options name. Throws InputError.
+Trajectory readBagTrajectory(const std::string& path, const TrajectoryOptions& options);
+/// Throws InputError: a topic is none of the bag's.
+[[noreturn]] void requireBagTopic(const std::string& name, const std::string& topic,
+                                  const std::vector<BagTopic>& topics);
 
 /// True if a line is one of COLMAP's images.txt: a number, a unit quaternion, a translation, a camera, a name.
 bool looksLikeColmap(std::string_view line);

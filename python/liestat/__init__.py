@@ -22,6 +22,7 @@ from ._columns import columns, from_columns
 from ._conversions import (
     convert_trajectory,
     diagnose_conventions,
+    read_bag,
     read_pose_graph,
     read_trajectory,
     write_trajectory,

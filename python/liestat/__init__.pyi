@@ -1525,6 +1525,15 @@ def read_trajectory(
     time_unit: Literal["s", "ms", "us", "ns"] | None = None,
     duplicates: Literal["drop", "mean"] | None = None,
     largest_file: float = 1.0,
+    frames: str | None = None,
+) -> Result: ...
+def read_bag(
+    path: Any,
+    topic: str | None = None,
+    convention: str | None = None,
+    *,
+    frames: str | None = None,
+    largest_file: float = 1.0,
 ) -> Result: ...
 def read_pose_graph(path: Any, *, ignore_unknown: bool = False, norm_tolerance: float = 1e-3) -> Result: ...
 def write_trajectory(

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 
 from . import _core
-from ._files import _reader
+from ._files import _reader, read_imu
 from ._manifolds import SE3
 from ._operate import as_numbers
 from ._results import Result
@@ -55,18 +55,20 @@ def read_trajectory(
     time_unit=None,
     duplicates=None,
     largest_file=1.0,
+    frames=None,
 ):
     """Poses, times and covariances from a file of any format that the program reads (docs/formats.md).
 
     Parameters
     ----------
     path : str or path
+        Of a bag with its topic: 'run.bag:/odom' (docs/bags.md).
     convention : str, optional
         That of the file's covariances, 'ros-fixed' or 'right,order=rt' (docs/which_convention.md); by default what the
         file or its format states. 'unknown' leaves the matrices as they are: `covariances` is None.
     format : str
         'auto' looks at the first lines; tum, kitti, euroc, csv, openvins, ros-json, ros-yaml, ros-csv, mavlink-json,
-        mavlink-csv, matrix, colmap, g2o, toro.
+        mavlink-csv, matrix, colmap, g2o, toro, bag.
     covariance_file : str or path, optional
         A side file; by default the file's name with .cov after it, if there is one.
     layout : {'full36', 'upper21', 'lower21', 'blocks12', 'diag6'}, optional
@@ -82,6 +84,8 @@ def read_trajectory(
         their mean. By default the rows are those of the file.
     largest_file : float
         Size of a text that is read, expanded, GB.
+    frames : str, optional
+        Of a bag without a topic: 'map:base_link', the pose of base_link in map by /tf and /tf_static.
 
     Returns
     -------
@@ -117,8 +121,49 @@ def read_trajectory(
         time_unit or "",
         duplicates or "",
         float(largest_file),
+        frames or "",
     )
     return Result("trajectory of a file", poses=SE3._of(d.pop("poses")), **d)
+
+
+def read_bag(path, topic=None, convention=None, *, frames=None, largest_file=1.0):
+    """The topics of a bag of ROS 1 or 2, or what one of them has (docs/bags.md).
+
+    Parameters
+    ----------
+    path : str or path
+        A file .bag, .db3, .mcap, or .zstd around one, or the directory of a ROS 2 bag.
+    topic : str, optional
+        Of PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped or Imu messages; nothing lists the topics.
+    convention : str, optional
+        That of the covariances, as in `read_trajectory`, 'ros-fixed' or 'ros-rpy'; 'unknown' leaves them as they are.
+    frames : str, optional
+        'map:base_link': the pose of base_link in map by /tf and /tf_static, or by the topic and its _static.
+    largest_file : float
+        GB that a .zstd file expands to.
+
+    Returns
+    -------
+    Result
+        As of `read_trajectory`, or of `read_imu`; without topic and frames `topics`, a list of Results with `topic`,
+        `type`, `encoding`, `messages`, `first` and `last` (s, when they were recorded), and `notes`.
+
+    Raises
+    ------
+    ValueError
+        With file, number of the message, what was found and what was expected; where the module was built without the
+        library that a bag needs, the package that has it.
+    """
+    path = os.fspath(path)
+    if topic is None and frames is None:
+        d = _reader("list_bag")(path, float(largest_file))
+        return Result("bag", topics=[Result("topic", **t) for t in d["topics"]], notes=d["notes"])
+    if frames is None:
+        known = {t["topic"]: t["type"] for t in _reader("list_bag")(path, float(largest_file))["topics"]}
+        if known.get(topic) == "sensor_msgs/Imu":
+            return read_imu(f"{path}:{topic}")
+    at = path if topic is None else f"{path}:{topic}"
+    return read_trajectory(at, convention, frames=frames, largest_file=largest_file)
 
 
 def read_pose_graph(path, *, ignore_unknown=False, norm_tolerance=1e-3):

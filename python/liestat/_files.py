@@ -89,12 +89,12 @@ def read_features(
 
 
 def read_imu(path):
-    """Readings of an inertial sensor from EuRoC's format or CSV with t wx wy wz ax ay az.
+    """Readings of an inertial sensor from EuRoC's format, CSV with t wx wy wz ax ay az, or a bag ('run.bag:/imu').
 
     Returns
     -------
     Result
-        `times` (s, since `start_ns`), `rates` (rad/s), `forces` (m/s²), `start_ns`, `format`.
+        `times` (s, since `start_ns`), `rates` (rad/s), `forces` (m/s²), `start_ns`, `format`, `notes`.
     """
     d = _reader("read_imu")(os.fspath(path))
     r = d["readings"]
@@ -105,6 +105,7 @@ def read_imu(path):
         forces=r[:, 4:7].copy(),
         start_ns=d["start_ns"],
         format=d["format"],
+        notes=d["notes"],
     )
 
 

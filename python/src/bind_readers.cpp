@@ -86,6 +86,7 @@ py::dict readImuFile(const std::string& path) {
   py::dict d;
   d["format"] = file.format;
   d["start_ns"] = file.start_ns;
+  d["notes"] = file.notes;
   d["readings"] = rowsOf(file.samples, 7, [](const ImuSample<double>& sample, double* out) {
     out[0] = sample.time;
     Eigen::Map<Eigen::Vector3d>{out + 1} = sample.angular_rate;

@@ -1,4 +1,5 @@
 // The program's readers and writer of trajectories and pose graphs for Python.
+#include <formats/bag.hpp>
 #include <formats/input_error.hpp>
 #include <formats/pose_graph.hpp>
 #include <formats/text.hpp>
@@ -35,8 +36,9 @@ py::object nameOf(const std::optional<Convention>& c) {
 TrajectoryOptions readingOptions(const std::string& format, const std::string& covariance_file,
                                  const std::string& layout, double unmeasured, const std::vector<std::string>& columns,
                                  bool ignore_unknown, double norm_tolerance, const std::string& time_unit,
-                                 double largest_file) {
+                                 double largest_file, const std::string& frames) {
   TrajectoryOptions options;
+  options.frames = frames;
   options.format = format, options.covariance_file = covariance_file, options.unmeasured = unmeasured;
   options.reading.columns = columns, options.reading.ignore_unknown = ignore_unknown;
   options.reading.norm_tolerance = norm_tolerance, options.reading.largest_file = largest_file;
@@ -49,9 +51,10 @@ TrajectoryOptions readingOptions(const std::string& format, const std::string& c
 py::dict readTrajectory(const std::string& path, const std::string& convention, const std::string& format,
                         const std::string& covariance_file, const std::string& layout, double unmeasured,
                         const std::vector<std::string>& columns, bool ignore_unknown, double norm_tolerance,
-                        const std::string& time_unit, const std::string& duplicates, double largest_file) {
+                        const std::string& time_unit, const std::string& duplicates, double largest_file,
+                        const std::string& frames) {
   const TrajectoryOptions options = readingOptions(format, covariance_file, layout, unmeasured, columns, ignore_unknown,
-                                                   norm_tolerance, time_unit, largest_file);
+                                                   norm_tolerance, time_unit, largest_file, frames);
   const Trajectory t = [&] {
     const py::gil_scoped_release released;
     Trajectory read = liestat::readTrajectory(path, options);
@@ -140,6 +143,13 @@ py::tuple formatTrajectory(const DoubleArray& poses, const std::optional<DoubleA
 
 void bindTrajectoryFiles(py::module_& module) {
   module.def("read_trajectory", &readTrajectory);
+  module.def("list_bag", [](const std::string& path, double largest_file) {
+    const BagContents bag = [&] {
+      const py::gil_scoped_release released;
+      return listBag(path, largest_file);
+    }();
+    return DictView::of(bag);
+  });
   module.def("read_pose_graph", &readPoseGraph);
   module.def("convention_to_write", &conventionToWrite);
   module.def("format_trajectory", &formatTrajectory);

@@ -54,6 +54,24 @@ class Files(unittest.TestCase):
         np.testing.assert_array_equal(tracks.pixels, [[1, 2], [3, 4], [5, 6]])
         np.testing.assert_array_equal(tracks.track_ids, [7, 9])
 
+    def test_bag(self):
+        path = ROOT / "tests/data/bags/unindexed.mcap"
+        try:
+            bag = liestat.read_bag(path)
+        except ValueError as error:
+            self.skipTest(str(error))
+        self.assertEqual([t.topic for t in bag.topics][:3], ["/imu", "/moved", "/odom"])
+        self.assertEqual((bag.topics[2].type, bag.topics[2].messages, bag.notes), ("nav_msgs/Odometry", 5, []))
+        imu = liestat.read_bag(path, "/imu")
+        np.testing.assert_allclose(imu.times, 0.005 * np.arange(25), atol=1e-12)
+        odometry = liestat.read_bag(path, "/odom", "ros-fixed")
+        self.assertEqual((odometry.convention, odometry.frames), ("ros-fixed", ["odom", "base_link"]))
+        self.assertEqual((odometry.covariances.shape, odometry.time_texts[4]), ((5, 6, 6), "1700000000.100000000"))
+        chain = liestat.read_bag(path, frames="odom:base_link")
+        np.testing.assert_allclose(chain.poses.params, odometry.poses.params, atol=1e-15)
+        with self.assertRaisesRegex(ValueError, "there is no topic '/x', expected one of /imu"):
+            liestat.read_bag(path, "/x")
+
     def test_calibration(self):
         self.path.write_text(
             "cam0:\n  camera_model: pinhole\n  intrinsics: [460, 458, 367, 248]\n  distortion_model: radtan\n"

@@ -465,5 +465,30 @@ TEST_F(Convert, timesKeepTheirDigits) {
   EXPECT_TRUE(contains(refusal({write("k.txt", "1 0 0 1 0 1 0 2 0 0 1 3\n"), "--to", "tum"}), "the file has no times"));
 }
 
+TEST_F(Convert, TopicsOfABag) {
+  const TemporaryDirectory directory;
+  const std::string bag = LIESTAT_SOURCE_DIR "/tests/data/bags/unindexed.mcap", out = directory / "o.csv";
+  const ConvertRun list = convert({bag, "--list", "--json", directory / "l.json"});
+  if (list.status == 2 && contains(list.errors, "libzstd-dev")) GTEST_SKIP() << list.errors;
+  ASSERT_EQ(list.status, 0) << list.errors;
+  EXPECT_TRUE(contains(list.output, "/odom       nav_msgs/Odometry                        cdr               5"));
+  EXPECT_TRUE(contains(contentOf(directory / "l.json"), R"({"topic": "/imu", "type": "sensor_msgs/Imu")"));
+  // As of ROS' text formats, what the matrices mean is for the user to say.
+  const ConvertRun unnamed = convert({bag + ":/odom", out, "--to", "csv"});
+  EXPECT_TRUE(unnamed.status == 2 && contains(unnamed.errors, "the format bag does not say what its covariances mean"));
+  ASSERT_EQ(convert({bag + ":/odom", out, "--to", "csv", "--cov-from", "ros-fixed"}).status, 0);
+  const Trajectory t = readTrajectory(bag + ":/odom"), written = readTrajectory(out);
+  ASSERT_EQ(written.size(), 5U);
+  for (std::size_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(written.time_texts[i], t.time_texts[i]);
+    EXPECT_LT((gaussiansOf(written)[i].covariance - gaussiansOf(t, "ros-fixed")[i].covariance).norm(), 1e-16);
+  }
+  ASSERT_EQ(convert({bag, out, "--to", "tum", "--frames", "map:camera"}).status, 0);
+  EXPECT_EQ(readTrajectory(out).size(), 5U);
+  const ConvertRun same = convert({bag + ":/pose", out});
+  EXPECT_TRUE(same.status == 2 && contains(same.errors, "read, not written")) << same.errors;
+  EXPECT_TRUE(contains(convert({bag + ":/pose"}).errors, "OUT is missing"));
+}
+
 }  // namespace
 }  // namespace liestat::cli
