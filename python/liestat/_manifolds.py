@@ -833,6 +833,7 @@ class SO2(_Metric, Group, core="SO2"):
     __slots__ = ()
     dimension = 2
     tangent_names = ("r",)
+    _matrix = 2
     _unit = slice(0, 2)
     _origin = (1.0, 0.0)
 
