@@ -6,7 +6,7 @@
 
 #include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
-#include <stats/detail/chunk_codec.hpp>
+#include <stats/chunk_codec.hpp>
 
 #include <chrono>
 #include <cstddef>
@@ -30,7 +30,7 @@ struct RunPart {
 /// The tasks of the process that have a result, in memory and in a file. Functions may be called from any thread.
 class RunState {
  public:
-  using Bytes = detail::Bytes;
+  using Bytes = ChunkBytes;
 
   /// Takes results over from all parts of a run, which `run` names: the command and the options that decide its numbers.
   /// Throws InputError for files that are damaged, of another run or version, or not all of its parts.
@@ -89,7 +89,7 @@ struct TrialExecutor {
   template <class Map, class Combine>
   auto reduce(std::size_t n_chunks, Map&& map, Combine&& combine) const {
     using T = std::remove_cvref_t<std::invoke_result_t<Map&, std::size_t>>;
-    using Codec = detail::ChunkCodec<T>;
+    using Codec = ChunkCodec<T>;
     static_assert(Codec::supported, "the results of trials are kept as bytes");
     const ProgramExecutor program{threads};
     if (!run_state.active()) return T(program.reduce(n_chunks, map, combine));

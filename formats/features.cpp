@@ -11,6 +11,7 @@
 
 #include <formats/detail/feature_columns.hpp>
 #include <formats/detail/feature_formats.hpp>
+#include <formats/detail/gzip.hpp>
 #include <formats/detail/mapped_file.hpp>
 #include <formats/detail/rows.hpp>
 #include <formats/input_error.hpp>
@@ -356,6 +357,10 @@ FeatureFile withoutUnmeasured(FeatureFile file) {
 
 FeatureFile readFeatures(std::string_view text, std::string file, const ReadingOptions& options) {
   return FeatureReader(text, std::move(file), options, {}).read();
+}
+
+bool hasFeatureChunks(const std::string& path) {
+  return detail::MappedFile::isPossible(path) && !detail::isGzip(detail::MappedFile(path).bytes());
 }
 
 void readFeatureChunks(const std::string& path, const ReadingOptions& options,

@@ -82,6 +82,8 @@ std::vector<std::string> formatNames();
 /// Reads features from a file, `-` is standard input. Throws InputError.
 FeatureFile readFeatureFile(const std::string& path, const ReadingOptions& options = {});
 
+/// True for regular files that are not empty or compressed, which readFeatureChunks() can read.
+bool hasFeatureChunks(const std::string& path);
 /// Reads features of a file that is mapped, not compressed, and of any size: some thousand rows at a time go to take(),
 /// and are forgotten. Throws InputError.
 void readFeatureChunks(const std::string& path, const ReadingOptions& options,

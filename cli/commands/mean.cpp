@@ -1,4 +1,3 @@
-#include <formats/detail/mapped_file.hpp>
 #include <formats/ebsd.hpp>
 #include <formats/input_error.hpp>
 #include <report/publish.hpp>
@@ -11,6 +10,7 @@
 #include <stats/mean_notes.hpp>
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -46,8 +46,7 @@ struct Options {
   }
   /// The file is larger than the memory that it may take, and need not be in memory as a whole.
   bool streams() const {
-    const bool mapped = detail::MappedFile::isPossible(input.file) && (input.hasChunks() || NpyFile::isOne(input.file));
-    return mapped && static_cast<double>(detail::MappedFile(input.file).bytes().size()) > 1e9 * memory;
+    return hasFeatureChunks(input.file) && static_cast<double>(std::filesystem::file_size(input.file)) > 1e9 * memory;
   }
 };
 

@@ -1,8 +1,6 @@
 #include <cli/commands/measurement_options.hpp>
 
 #include <cli/commands/reading_options.hpp>
-#include <formats/detail/gzip.hpp>
-#include <formats/detail/mapped_file.hpp>
 #include <formats/npy.hpp>
 
 #include <string>
@@ -37,10 +35,7 @@ ReadingOptions MeasurementInput::howToRead() const {
   return how;
 }
 
-bool MeasurementInput::hasChunks() const {
-  if (!detail::MappedFile::isPossible(file)) return false;
-  return !detail::isGzip(detail::MappedFile(file).bytes()) && !NpyFile::isOne(file);
-}
+bool MeasurementInput::hasChunks() const { return hasFeatureChunks(file) && !NpyFile::isOne(file); }
 
 void MeasurementInput::readInChunks(const std::string& command,
                                     const std::function<void(const Measurements&)>& take) const {
