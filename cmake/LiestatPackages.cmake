@@ -31,6 +31,8 @@ liestat_dependency(benchmark libbenchmark-dev benchmark/benchmark.h)
 liestat_dependency(opencv libopencv-calib3d-dev opencv2/calib3d.hpp)
 # Headers for an extension of SQLite (engines/sqlite).
 liestat_dependency(sqlite libsqlite3-dev sqlite3ext.h)
+# Its makefiles, and the server that the tests start (engines/postgresql).
+liestat_dependency(postgresql postgresql-server-dev-15 postgres.h)
 # Compared with: the meaning of a covariance in these. Nothing else uses them.
 liestat_dependency(kdl liborocos-kdl-dev kdl/frames.hpp)
 liestat_dependency(tf2 libtf2-geometry-msgs-dev tf2_geometry_msgs/tf2_geometry_msgs.h)
@@ -134,6 +136,19 @@ macro(liestat_find name)
     # Without the message packages that their CMake files would have.
     string(REPLACE kdl orocos-kdl liestat_library ${name})
     liestat_provide_library(${name} ${liestat_library})
+  elseif("${name}" STREQUAL "postgresql")
+    find_program(LIESTAT_PG_CONFIG pg_config)
+    mark_as_advanced(LIESTAT_PG_CONFIG)
+    if(LIESTAT_PG_CONFIG)
+      execute_process(COMMAND ${LIESTAT_PG_CONFIG} --bindir OUTPUT_VARIABLE liestat_programs OUTPUT_STRIP_TRAILING_WHITESPACE)
+      execute_process(COMMAND ${LIESTAT_PG_CONFIG} --pgxs OUTPUT_VARIABLE liestat_makefiles OUTPUT_STRIP_TRAILING_WHITESPACE)
+      if(EXISTS ${liestat_programs}/initdb AND EXISTS ${liestat_makefiles})
+        execute_process(COMMAND ${LIESTAT_PG_CONFIG} --includedir-server OUTPUT_VARIABLE liestat_headers
+                        OUTPUT_STRIP_TRAILING_WHITESPACE)
+        liestat_provide(postgresql)
+        target_include_directories(liestat_postgresql SYSTEM INTERFACE ${liestat_headers})
+      endif()
+    endif()
   elseif("${name}" STREQUAL "mrpt")
     liestat_provide_package(mrpt mrpt-poses mrpt::poses)
   else()

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <experiments/interruption.hpp>
-#include <experiments/parallel.hpp>
+#include <experiments/run_state.hpp>
 #include <stats/validation.hpp>
 
 #include <cstddef>
@@ -39,11 +39,12 @@ class CellRun {
     for (const CellSize& cell : cells_) all_ += cell.cost, trials_of_run.planned += cell.trials;
   }
 
-  /// The next cell by validateAll() of stats/validation.hpp: a report for each law.
+  /// The next cell by validateAll() of stats/validation.hpp: a report for each law. A trial may only return its results,
+  /// which may come from a file (experiments/run_state.hpp).
   template <class Trial>
   auto reports(std::size_t chunk_size, const std::vector<ReferenceLaw>& laws, Trial&& trial) {
     const std::size_t trials = cells_[next_].trials;
-    auto list = validateAll(ProgramExecutor{size_.threads},
+    auto list = validateAll(TrialExecutor{size_.threads},
                             {.trials = trials,
                              .seed = size_.seed,
                              .chunk_size = chunk_size,
@@ -54,13 +55,13 @@ class CellRun {
     return list;
   }
 
-  /// The next cell as a list of trial(number). `whole`: if not all of them were done, none is given.
+  /// The next cell as a list of trial(number), plain data. `whole`: if not all of them were done, none is given.
   template <class Trial>
   auto outcomes(Trial&& trial, bool whole = false) {
     using Outcomes = std::vector<std::invoke_result_t<Trial&, std::uint64_t>>;
     const std::size_t trials = cells_[next_].trials;
     // One trial in a chunk: some cells have ten of a second each.
-    Outcomes list = ProgramExecutor{size_.threads}.reduce(
+    Outcomes list = TrialExecutor{size_.threads}.reduce(
         trials, [&](std::size_t i) { return runStopped() ? Outcomes{} : Outcomes{trial(std::uint64_t{i})}; },
         [&](Outcomes& done, const Outcomes& more) {
           done.insert(done.end(), more.begin(), more.end());
@@ -71,7 +72,8 @@ class CellRun {
     return list;
   }
 
-  /// The last cell was interrupted before its first trial ended: there is nothing to show of it, and no more is run.
+  /// The last cell was interrupted before its first trial ended, or its trials are part of a run: there is nothing to
+  /// show of it. Further cells of an interrupted run have no trials either.
   bool ended() const { return ended_; }
 
  private:

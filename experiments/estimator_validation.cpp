@@ -254,7 +254,7 @@ std::vector<EstimatorRow> validateEstimator(const EstimatorValidation& validatio
     for (const RowPlan& row : plan.rows) laws.push_back(ReferenceLaw::chiSquared(row.dof));
     auto reports = run.reports(
         16, laws, [&](CounterRng& rng, std::uint64_t number) { return trial(plan, validation, number, rng); });
-    if (run.ended()) break;
+    if (run.ended()) continue;
     for (std::size_t i = 0; i < plan.rows.size(); ++i) {
       EstimatorRow& row = rows.emplace_back();
       row.experiment = plan.experiment;

@@ -253,7 +253,7 @@ std::vector<HandEyeRow> validateHandEye(const HandEyeValidation& validation, con
         [&](CounterRng&, std::uint64_t number) {
           return runTrial(plan, validation.noise_factor, validation.run.seed, number);
         });
-    if (run.ended()) break;
+    if (run.ended()) continue;
 
     HandEyeRow row = plan.row;
     row.trials = reports[0].trials;

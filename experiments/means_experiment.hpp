@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace liestat {
@@ -19,17 +20,20 @@ namespace liestat::experiments {
 /// The simulated experiments of Pennec 1998, section 5: a feature, a noise, a number of measurements; all criteria on
 /// the same draws, so that their accuracies can be compared trial by trial.
 
-/// The features of the experiment: those with a Riemannian metric.
+/// The features of the experiment: those with a Riemannian metric, but for headings, which the report has not.
+template <class M>
+concept ExperimentFeature = Metric<M> && !std::is_same_v<M, SO2d>;
+inline constexpr bool isOfExperiment(const FeatureInfo& row) { return row.has_metric && row.kind != Feature::heading; }
 inline constexpr auto all_features = [] {
   constexpr auto count = [] {
     std::size_t n = 0;
-    for (const FeatureInfo& row : feature_rows) n += row.has_metric ? 1 : 0;
+    for (const FeatureInfo& row : feature_rows) n += isOfExperiment(row) ? 1 : 0;
     return n;
   };
   std::array<Feature, count()> list{};
   std::size_t n = 0;
   for (const FeatureInfo& row : feature_rows) {
-    if (row.has_metric) list[n++] = row.kind;
+    if (isOfExperiment(row)) list[n++] = row.kind;
   }
   return list;
 }();

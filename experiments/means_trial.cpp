@@ -206,7 +206,7 @@ MethodOutcomes trial(const MeansExperiment& experiment, CounterRng& rng) {
 }  // namespace
 
 MethodOutcomes meansTrial(const MeansExperiment& experiment, CounterRng& rng) {
-  return withFeature(experiment.feature, [&]<Metric M>() { return trial<M>(experiment, rng); });
+  return withFeature(experiment.feature, [&]<ExperimentFeature M>() { return trial<M>(experiment, rng); });
 }
 
 }  // namespace liestat::experiments

@@ -136,7 +136,7 @@ std::vector<MeansRow> validateMeans(const MeansValidation& validation, const Run
   std::vector<MeansRow> rows;
   for (const Cell& r : cells) {
     auto reports = runCell(r.experiment, run);
-    if (run.ended()) break;
+    if (run.ended()) continue;
     std::size_t next = 0;
     for (std::size_t m = 0; m < methods.size(); ++m) {
       if (!r.experiment.wanted[m]) continue;

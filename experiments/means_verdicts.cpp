@@ -459,13 +459,13 @@ std::vector<VerdictRow> judgeVerdicts(const std::vector<VerdictCell>& cells, std
   for (const VerdictCell& cell : cells) {
     VerdictRow row = cell.symmetry ? judge<CrystalOrientation, CrystalSampler>(cell, seed, run)
                                    : withFeature(cell.feature, [&]<class M>() -> VerdictRow {
-                                       if constexpr (Metric<M>) {
+                                       if constexpr (ExperimentFeature<M>) {
                                          return judge<M>(cell, seed, run);
                                        } else {
                                          return {};
                                        }
                                      });
-    if (run.ended()) break;
+    if (run.ended()) continue;
     row.promise = promiseOf(cell);
     giveVerdict(row);
     rows.push_back(std::move(row));

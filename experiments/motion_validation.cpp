@@ -467,7 +467,7 @@ std::vector<MotionRow> validateMotion(const MotionValidation& validation, const 
   std::vector<MotionRow> rows;
   for (const MotionRow& cell : cells) {
     const auto trials = run.outcomes([&](std::uint64_t number) { return runTrial(cell, validation, number); });
-    if (run.ended()) break;
+    if (run.ended()) continue;
     rows.push_back(summarised(cell, trials));
     judge(rows.back(), trials, run_false_alarm / static_cast<double>(std::max<std::size_t>(tests, 1)));
   }

@@ -264,7 +264,7 @@ std::vector<PreintegrationRow> validatePreintegration(const PreintegrationValida
           }
           return std::vector<TrialOutcome>{outcome};
         });
-    if (run.ended()) break;
+    if (run.ended()) continue;
     if (row.check == PreintegrationCheck::recording) {
       row.conclude(std::move(reports.front()), std::nullopt, 0);
       judge(row, scene, run_false_alarm / judged);

@@ -93,7 +93,7 @@ std::vector<PropagationRow> validatePropagation(const PropagationValidation& val
   for (const Propagated feature : validation.features) {
     const std::size_t first = rows.size();
     rows.resize(first + chosen.size() * spreads.size());
-    for (std::size_t s = 0; s < spreads.size() && !run.ended(); ++s) {
+    for (std::size_t s = 0; s < spreads.size(); ++s) {
       const PropagationExperiment experiment{.feature = feature, .spread = spreads[s], .methods = chosen};
       std::vector<ReferenceLaw> laws;
       for (const PropagationMethod& method : chosen) {
@@ -102,7 +102,7 @@ std::vector<PropagationRow> validatePropagation(const PropagationValidation& val
       // A trial takes microseconds.
       auto reports =
           run.reports(256, laws, [&](CounterRng& rng, std::uint64_t) { return propagationTrial(experiment, rng); });
-      if (run.ended()) break;
+      if (run.ended()) continue;
       for (std::size_t m = 0; m < chosen.size(); ++m) {
         PropagationRow& row = rows[first + m * spreads.size() + s];
         row.experiment = experiment;

@@ -10,7 +10,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <memory>
 #include <span>
@@ -154,7 +156,8 @@ struct Thresholds {
   double histogram = nothing, moments = nothing;
 };
 struct Trial {
-  std::vector<Search> searches;
+  std::array<Search, 4> searches;  ///< of as many scores
+  std::size_t n = 0;               ///< none if it ended in an exception
   Thresholds thresholds;
 };
 
@@ -202,8 +205,8 @@ Trial searchedByAll(const Model& model, const RobustValidation& validation, doub
   for (const RobustScore score : validation.scores) {
     Thresholds thresholds;
     const auto run = [&](const auto& rule) {
-      trial.searches.push_back(
-          searched(model, rule, threshold, max_draws, validation.confidence, validation.draw_factor, seed, thresholds));
+      trial.searches.at(trial.n++) =
+          searched(model, rule, threshold, max_draws, validation.confidence, validation.draw_factor, seed, thresholds);
     };
     switch (score) {
       case RobustScore::relevance:
@@ -376,33 +379,32 @@ RobustValidationResult validateRobust(const RobustValidation& validation, const 
     const bool conic = one.structure == RobustStructure::conic;
     const int k = conic ? ConicModel::free_parameters : PlaneModel::free_parameters;
     const int equations = conic ? ConicModel::equations : PlaneModel::equations;
-    std::vector<Trial> trials(validation.run.trials);
-    auto reports = run.reports(4, std::vector<ReferenceLaw>(validation.scores.size(), ReferenceLaw::chiSquared(k)),
-                               [&](CounterRng& rng, std::uint64_t number) {
-                                 trials[number] = runTrial(one, validation, number, rng);
-                                 std::vector<TrialOutcome> outcomes;
-                                 for (const Search& search : trials[number].searches) {
-                                   outcomes.push_back({.mu2 = search.distance, .failed = !search.found});
-                                 }
-                                 return outcomes;
-                               });
-    if (run.ended()) break;
-    const std::size_t n_trials = reports.empty() ? validation.run.trials : reports[0].trials;
-    trials.resize(n_trials);
+    const std::vector<Trial> trials = run.outcomes([&](std::uint64_t number) {
+      CounterRng rng(validation.run.seed, number);
+      try {
+        return runTrial(one, validation, number, rng);
+      } catch (const std::exception&) {
+        return Trial{};
+      }
+    });
+    if (run.ended()) continue;
+    const std::size_t n_trials = trials.size();
     for (std::size_t i = 0; i < validation.scores.size(); ++i) {
       RobustRow& row = result.rows.emplace_back();
       row.structure = one.structure, row.score = validation.scores[i], row.outliers = one.outliers;
       row.confidence = validation.confidence, row.needed = one.needed, row.trials = n_trials;
       const auto n = static_cast<double>(n_trials);
+      std::vector<double> distances;
       for (const Trial& trial : trials) {
-        if (trial.searches.size() <= i) continue;  // ended in an exception
-        const Search& search = trial.searches[i];
+        const Search& search = trial.searches[i];  // found nothing if it ended in an exception
+        distances.push_back(search.found ? search.distance : nothing);
+        if (trial.n <= i) continue;
         row.found += search.found ? 1U : 0U;
         row.right += search.right / n, row.draws += static_cast<double>(search.draws) / n;
         row.wrong += search.wrong / n;
       }
       row.cut_factor = cutFactor(equations);
-      row.conclude(std::move(reports[i]), promiseOf(one), run_false_alarm / judged);
+      row.conclude(reportOfDistances(distances, ReferenceLaw::chiSquared(k)), promiseOf(one), run_false_alarm / judged);
       if (row.promise) {
         row.found_passed =
             binomialSurvival(row.trials - row.found, row.trials, 1 - validation.confidence) >= run_false_alarm / judged;

@@ -9,6 +9,7 @@
 #include <Eigen/SVD>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -95,7 +96,7 @@ bool isDegenerate(const Eigen::Matrix3d& F, const std::vector<Eigen::Vector4d>& 
 }
 
 struct ChoiceRun {
-  std::string chosen;
+  std::array<char, 32> chosen{};  ///< the model's name
   bool right = false, degenerate = false;
   double homography_inliers = 0, fundamental_inliers = 0, far = 0, explained = 0, allowed = 0;
   double homography_cost = 0, fundamental_cost = 0, validation_error = infinity;
@@ -111,7 +112,7 @@ ChoiceRun runChoice(const Normalised& pair, std::uint64_t seed) {
   const auto &H = search.state(h), &F = search.state(f);
   const bool planar = pair.pair->family == PairFamily::homogr;
   ChoiceRun run;
-  run.chosen = search.models()[search.best()]->name();
+  search.models()[search.best()]->name().copy(run.chosen.data(), run.chosen.size() - 1);
   run.right = search.best() == (planar ? h : f);
   run.homography_inliers = static_cast<double>(H.inliers.size());
   run.fundamental_inliers = static_cast<double>(F.inliers.size());
@@ -248,9 +249,9 @@ PairChoice summarise(const Normalised& pair, const std::vector<ChoiceRun>& runs)
   for (const ChoiceRun& run : runs) {
     row.right += run.right, row.degenerate += run.degenerate;
     const auto known =
-        std::find_if(row.chosen.begin(), row.chosen.end(), [&](const auto& c) { return c.first == run.chosen; });
+        std::find_if(row.chosen.begin(), row.chosen.end(), [&](const auto& c) { return c.first == run.chosen.data(); });
     if (known == row.chosen.end()) {
-      row.chosen.emplace_back(run.chosen, 1);
+      row.chosen.emplace_back(run.chosen.data(), 1);
     } else {
       ++known->second;
     }
@@ -398,7 +399,6 @@ TwoViewPairsResult validateTwoViewPairs(const std::vector<TwoViewPair>& pairs, c
     } else {
       add(result.choices, runChoice);
     }
-    if (run.ended()) break;
   }
   result.checks = checksOf(result);
   return result;

@@ -94,8 +94,8 @@ std::vector<TwoViewRuleRow> compareTwoViewRules(const TwoViewRuleComparison& com
                                       .matches = comparison.matches,
                                       .outliers = comparison.outliers,
                                       .sigma = comparison.sigma};
-    // A row for each trial: which rules were right.
-    const std::vector<std::vector<bool>> trials = run.outcomes([&](std::uint64_t number) {
+    // Of each trial a bit for each rule that was right.
+    const auto trials = run.outcomes([&](std::uint64_t number) {
       const std::uint64_t seed = comparison.run.seed * 1000003 + number;
       const TwoViewScene scene(options, seed);
       const double sigma = options.sigma / options.focal_length;
@@ -104,18 +104,20 @@ std::vector<TwoViewRuleRow> compareTwoViewRules(const TwoViewRuleComparison& com
       search.add(scene.matches);
       while (search.iterate()) {
       }
-      std::vector<bool> right;
-      for (const Rule& rule : rules()) {
-        right.push_back(search.models()[rule.choose(search, sigma)]->name() == nameOf(options.motion));
+      std::uint64_t right = 0;
+      for (std::size_t r = 0; r < rules().size(); ++r) {
+        const bool one = search.models()[rules()[r].choose(search, sigma)]->name() == nameOf(options.motion);
+        right |= std::uint64_t{one} << r;
       }
       return right;
     });
-    if (run.ended()) return k == 0 ? std::vector<TwoViewRuleRow>{} : rows;
+    if (run.ended()) continue;
     for (std::size_t r = 0; r < rows.size(); ++r) {
       rows[r].trials[k] = trials.size();
-      for (const std::vector<bool>& right : trials) rows[r].right[k] += right[r];
+      for (const std::uint64_t right : trials) rows[r].right[k] += right >> r & 1;
     }
   }
+  if (rows.front().trials[0] == 0) rows.clear();
   return rows;
 }
 

@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
+#include <limits>
 #include <utility>
 
 namespace liestat::experiments {
@@ -89,21 +91,21 @@ TwoViewValidationResult validateTwoView(const TwoViewValidation& validation, con
         .motion = motion, .matches = validation.matches, .outliers = validation.outliers, .sigma = validation.sigma};
     const int k = dimensionOf(options);
     TwoViewChoice choice;
-    std::vector<std::size_t> chosen(validation.run.trials);
-    auto reports = run.reports(4, {ReferenceLaw::chiSquared(std::max(k, 1))}, [&](CounterRng&, std::uint64_t number) {
-      // Each trial has a place of its own.
-      const Trial trial = runTrial(options, validation.run.seed * 1000003 + number);
-      chosen[number] = trial.chosen;
-      TrialOutcome outcome;
-      outcome.failed = !trial.distance && k > 0;
-      outcome.mu2 = trial.distance.value_or(0);
-      return std::vector<TrialOutcome>{outcome};
+    const std::vector<Trial> trials = run.outcomes([&](std::uint64_t number) {
+      try {
+        return runTrial(options, validation.run.seed * 1000003 + number);
+      } catch (const std::exception&) {
+        return Trial{};
+      }
     });
-    if (run.ended()) return result;
-    chosen.resize(reports[0].trials);
+    if (run.ended()) continue;
     choice.truth = motion;
-    choice.trials = chosen.size();
-    for (const std::size_t c : chosen) ++choice.chosen[c];
+    choice.trials = trials.size();
+    std::vector<double> distances;
+    for (const Trial& trial : trials) {
+      ++choice.chosen[trial.chosen];
+      distances.push_back(trial.distance.value_or(std::numeric_limits<double>::quiet_NaN()));
+    }
     choice.passed = reaches(static_cast<double>(choice.right()), static_cast<double>(choice.trials), promised_row);
     result.choices.push_back(choice);
     if (k == 0) continue;
@@ -114,10 +116,11 @@ TwoViewValidationResult validateTwoView(const TwoViewValidation& validation, con
     ValidationTolerance promise{.index = 0.1, .ks = 0.05, .failure_fraction = 0.01, .tail = 0.02};
     // One that may be refused has distances where it was chosen, and how often that is, is judged above.
     if (motion == TwoViewMotion::shared_focal) promise.failure_fraction = 1 - promised_row;
-    row.conclude(std::move(reports[0]), promise, run_false_alarm / static_cast<double>(validation.motions.size()));
+    row.conclude(reportOfDistances(distances, ReferenceLaw::chiSquared(k)), promise,
+                 run_false_alarm / static_cast<double>(validation.motions.size()));
     result.rows.push_back(std::move(row));
   }
-  if (trials_of_run.incomplete()) return result;
+  if (trials_of_run.incomplete() || result.choices.empty()) return result;
   const auto asked = [&](TwoViewMotion motion) {
     return std::find(validation.motions.begin(), validation.motions.end(), motion) != validation.motions.end();
   };

@@ -283,7 +283,7 @@ std::vector<ViInitRow> validateViInit(const ViInitValidation& validation, const 
   std::vector<ViInitRow> rows;
   for (std::size_t i = 0; i < list.size(); ++i) {
     const std::vector<ViInitValues> values = list[i].run(validation, run);
-    if (run.ended()) break;
+    if (run.ended()) continue;
     for (std::size_t k = 0; k < cells[i].size(); ++k) {
       evaluate(cells[i][k], values[k], list[i].rows[k].dof, false_alarm);
       rows.push_back(std::move(cells[i][k]));

@@ -10,6 +10,7 @@
 #include <lie/s2.hpp>
 #include <lie/se3.hpp>
 #include <lie/semi_oriented_frame3.hpp>
+#include <lie/so2.hpp>
 #include <lie/so3.hpp>
 #include <stats/mean_summary.hpp>
 
@@ -28,11 +29,11 @@
 namespace liestat {
 
 /// The kind of a feature. `frame` is a rigid motion with the left-invariant metric (lie/frame3.hpp), `se3` the same
-/// motion as an element of the Lie group.
-enum class Feature { point, rotation, frame, semi_oriented_frame, non_oriented_frame, se3, direction };
+/// motion as an element of the Lie group, `heading` a direction in the plane.
+enum class Feature { point, rotation, frame, semi_oriented_frame, non_oriented_frame, se3, direction, heading };
 
-/// A part of a feature's parameters: a unit quaternion x y z w, a position (m), a unit vector.
-enum class FeaturePart { rotation, position, direction };
+/// A part of a feature's parameters: a unit quaternion x y z w, a position (m), a unit vector, cosine and sine.
+enum class FeaturePart { rotation, position, direction, heading };
 
 /// One or two parts, in the order of the feature's parameters.
 class FeatureParts {
@@ -78,6 +79,7 @@ inline constexpr std::tuple feature_table{
         "non_oriented_frame", "non-oriented frames", {FeaturePart::rotation, FeaturePart::position}},
     FeatureRow<Feature::se3, SE3d>{"se3", "rigid motions (SE3)", {FeaturePart::rotation, FeaturePart::position}},
     FeatureRow<Feature::direction, S2d>{"direction", "directions", FeatureParts(FeaturePart::direction)},
+    FeatureRow<Feature::heading, SO2d>{"heading", "headings", FeatureParts(FeaturePart::heading)},
 };
 
 /// A feature's row at run time.

@@ -12,6 +12,8 @@
 #include <formats/bag.hpp>
 #include <formats/detail/feature_columns.hpp>
 #include <formats/detail/feature_formats.hpp>
+#include <formats/detail/gzip.hpp>
+#include <formats/detail/mapped_file.hpp>
 #include <formats/detail/rows.hpp>
 #include <formats/detail/trajectory_formats.hpp>
 #include <formats/input_error.hpp>
@@ -32,8 +34,12 @@ class FeatureReader {
   FeatureReader(std::string_view text, std::string file, const ReadingOptions& options, const detail::TakeFeature& take)
       : text_(text), reader_(text), name_(std::move(file)), options_(options), take_(take) {}
 
+  /// Rows go to take(rows, characters that were read) some thousand at a time.
+  void inChunks(std::function<void(const FeatureFile&, std::size_t)> take) { take_chunk_ = std::move(take); }
+
   FeatureFile read() {
-    requireText(text_, name_);
+    // A zero byte far behind is no number either.
+    requireText(take_chunk_ ? text_.substr(0, 1 << 20) : text_, name_);
     if (!reader_.next()) throw InputError(name_, 0, "the file has no data, only blank lines and comments");
     const detail::FeatureFormat& format = detail::featureFormat(options_, reader_, name_);
     file_.format = std::string(format.name);
@@ -82,19 +88,22 @@ class FeatureReader {
 
   /// Forgets the row that has been taken.
   void forget() {
-    file_.lines.clear(), file_.rotations.clear(), file_.positions.clear(), file_.directions.clear();
+    file_.lines.clear(), file_.rotations.clear(), file_.positions.clear(), file_.directions.clear(),
+        file_.headings.clear();
     file_.weights.clear(), file_.times.clear(), file_.covariances.clear(), file_.factors.clear();
     file_.unmeasured.clear();
   }
 
   void readRows() {
-    const std::size_t rows = take_ ? 1 : detail::mostRows(text_, layout_.columns.size());
+    constexpr std::size_t most = 1 << 15;
+    const std::size_t rows = take_ ? 1 : take_chunk_ ? most : detail::mostRows(text_, layout_.columns.size());
     const FeatureParts& parts = info(places_.kind).parts;
     file_.kind = places_.kind;
     file_.lines.reserve(rows);
     if (parts.contains(FeaturePart::rotation)) file_.rotations.reserve(rows);
     if (parts.contains(FeaturePart::position)) file_.positions.reserve(rows);
     if (parts.contains(FeaturePart::direction)) file_.directions.reserve(rows);
+    if (parts.contains(FeaturePart::heading)) file_.headings.reserve(rows);
     if (places_.weight != detail::absent) file_.weights.reserve(rows);
     if (places_.time != detail::absent) file_.times.reserve(rows);
     values_.resize(layout_.columns.size());
@@ -107,10 +116,15 @@ class FeatureReader {
         if (!layout_.columns[i].empty()) values_[i] = numberField(fields_[i], layout_.columns[i], name_, line_);
       }
       addRow();
+      if (take_chunk_ && file_.size() == most) {
+        take_chunk_(file_, static_cast<std::size_t>(reader_.line().data() - text_.data()));
+        forget();
+      }
       if (!take_) continue;
       take_(file_, layout_, fields_);
       forget();
     } while (reader_.next());
+    if (take_chunk_) return take_chunk_(file_, text_.size());
     if (take_) return;
     if (places_.weight != detail::absent && *std::max_element(file_.weights.begin(), file_.weights.end()) == 0) {
       throw InputError(name_, file_.lines.front(), "every weight is 0", "one above 0");
@@ -120,6 +134,7 @@ class FeatureReader {
     file_.rotations.shrink_to_fit();
     file_.positions.shrink_to_fit();
     file_.directions.shrink_to_fit();
+    file_.headings.shrink_to_fit();
     file_.weights.shrink_to_fit();
     file_.times.shrink_to_fit();
   }
@@ -131,6 +146,7 @@ class FeatureReader {
     if (parts.contains(FeaturePart::rotation)) file_.rotations.push_back(readRotation());
     if (parts.contains(FeaturePart::position)) file_.positions.push_back(readVector(places_.position));
     if (parts.contains(FeaturePart::direction)) file_.directions.push_back(readDirection());
+    if (parts.contains(FeaturePart::heading)) file_.headings.push_back(value(places_.heading));
     if (places_.weight != detail::absent) {
       const double weight = value(places_.weight);
       if (!(weight >= 0)) throw InputError(name_, line_, fmt::format("weight is {}", weight), "0 or more");
@@ -264,7 +280,10 @@ class FeatureReader {
     const int n = places_.dimension;
     const FeatureParts& parts = info(places_.kind).parts;
     const bool rotates = parts.contains(FeaturePart::rotation);
-    const int first_angle = rotates ? n - 3 : parts.contains(FeaturePart::direction) ? n - 2 : n;
+    const int first_angle = rotates                                  ? n - 3
+                            : parts.contains(FeaturePart::direction) ? n - 2
+                            : parts.contains(FeaturePart::heading)   ? 0
+                                                                     : n;
     bool found = first_angle < n && covariance(0, 0) == -1, large = false;
     for (int i = 0; i < n; ++i) {
       const double v = covariance(i, i);
@@ -301,6 +320,7 @@ class FeatureReader {
   std::string name_;
   ReadingOptions options_;
   detail::TakeFeature take_;
+  std::function<void(const FeatureFile&, std::size_t)> take_chunk_;
   detail::RowLayout layout_;
   detail::FeatureColumns places_;
   FeatureFile file_;
@@ -350,7 +370,8 @@ FeatureFile withoutUnmeasured(FeatureFile file) {
     }
     list.resize(kept);
   };
-  keep(file.rotations), keep(file.positions), keep(file.directions), keep(file.weights), keep(file.times);
+  keep(file.rotations), keep(file.positions), keep(file.directions), keep(file.headings), keep(file.weights),
+      keep(file.times);
   keep(file.covariances), keep(file.factors), keep(file.lines);
   file.unmeasured.clear();
   return file;
@@ -358,6 +379,21 @@ FeatureFile withoutUnmeasured(FeatureFile file) {
 
 FeatureFile readFeatures(std::string_view text, std::string file, const ReadingOptions& options) {
   return FeatureReader(text, std::move(file), options, {}).read();
+}
+
+bool hasFeatureChunks(const std::string& path) {
+  return detail::MappedFile::isPossible(path) && !detail::isGzip(detail::MappedFile(path).bytes());
+}
+
+void readFeatureChunks(const std::string& path, const ReadingOptions& options,
+                       const std::function<void(const FeatureFile&)>& take) {
+  const detail::MappedFile file(path);
+  FeatureReader reader(file.bytes(), sourceName(path), options, {});
+  reader.inChunks([&](const FeatureFile& rows, std::size_t end) {
+    if (rows.size() > 0) take(rows);
+    file.forget(end);
+  });
+  reader.read();
 }
 
 FeatureFile detail::readFeatureRows(std::string_view text, std::string name, const ReadingOptions& options,

@@ -1,4 +1,4 @@
-// Points, rotations, directions, frames and rigid motions from files: CSV, TUM, EuRoC, KITTI.
+// Points, rotations, directions, headings, frames and rigid motions from files: CSV, TUM, EuRoC, KITTI.
 //
 //   const liestat::FeatureFile file = liestat::readFeatureFile("rotations.csv");
 //   const std::vector<liestat::SO3d> rotations = liestat::featuresOf<liestat::SO3d>(file);
@@ -7,11 +7,13 @@
 #include <formats/feature.hpp>
 #include <formats/text.hpp>
 #include <stats/factored_gaussian.hpp>
+#include <stats/liestat_state.h>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -33,6 +35,7 @@ struct FeatureFile {
   std::vector<Eigen::Quaterniond> rotations;  ///< unit quaternions
   std::vector<Eigen::Vector3d> positions;     ///< points, or translations of frames
   std::vector<Eigen::Vector3d> directions;    ///< unit vectors
+  std::vector<double> headings;               ///< degrees, as they stand
   std::vector<double> weights;                ///< 0 or more, one above; empty if the file has none
   std::vector<double> times;                  ///< in seconds where the format says so; empty if the file has none
   /// Positive definite, translation before rotation; NaN in rows that `unmeasured` lists. Empty if the file has none.
@@ -81,6 +84,13 @@ std::vector<std::string> formatNames();
 /// are left out, since nothing says what they mean. Throws InputError.
 FeatureFile readFeatureFile(const std::string& path, const ReadingOptions& options = {});
 
+/// True for regular files that are not empty or compressed, which readFeatureChunks() can read.
+bool hasFeatureChunks(const std::string& path);
+/// Reads features of a file that is mapped, not compressed, and of any size: some thousand rows at a time go to take(),
+/// and are forgotten. Throws InputError.
+void readFeatureChunks(const std::string& path, const ReadingOptions& options,
+                       const std::function<void(const FeatureFile& rows)>& take);
+
 /// Reads features from memory; `name` stands for the file in messages. Throws InputError.
 FeatureFile readFeatures(std::string_view text, std::string name, const ReadingOptions& options = {});
 
@@ -102,6 +112,9 @@ std::vector<M> featuresOf(const FeatureFile& file) {
           break;
         case FeaturePart::direction:
           params.segment<3>(n) = file.directions[i], n += 3;
+          break;
+        case FeaturePart::heading:
+          if constexpr (std::is_same_v<M, SO2d>) liestat_heading(file.headings[i], params.data());
           break;
       }
     }

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,8 +10,10 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <string_view>
+#include <utility>
 
 #include <formats/input_error.hpp>
 
@@ -38,42 +38,25 @@ std::string_view headerValue(std::string_view header, std::string_view key) {
 }  // namespace
 
 bool NpyFile::isOne(const std::string& path) {
-  const int file = path == "-" ? -1 : ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return false;
-  char begin[6] = {};
-  struct stat status {};
   // A pipe is read once, and not here.
-  const bool regular = ::fstat(file, &status) == 0 && S_ISREG(status.st_mode);
-  const bool found = regular && ::read(file, begin, sizeof begin) == sizeof begin &&
-                     std::string_view(begin, sizeof begin) == npy_magic;
-  ::close(file);
-  return found;
+  if (!detail::MappedFile::isPossible(path)) return false;
+  return detail::MappedFile(path).bytes().substr(0, npy_magic.size()) == npy_magic;
 }
 
-NpyFile::NpyFile(const std::string& path) : name_(sourceName(path)) {
+NpyFile::NpyFile(const std::string& path) : name_(sourceName(path)), file_(path) {
   const auto refuse = [&](const std::string& found, const std::string& expected) {
     throw InputError(name_, 0, found, expected);
   };
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) refuse(fmt::format("cannot be read: {}", std::strerror(errno)), "");
-  struct stat status {};
-  const bool regular = ::fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_size > 0;
-  size_ = regular ? static_cast<std::size_t>(status.st_size) : 0;
-  void* const map = regular ? ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, file, 0) : MAP_FAILED;
-  ::close(file);
-  if (map == MAP_FAILED) refuse("the file cannot be mapped", "a regular file that is not empty");
-  map_ = std::shared_ptr<const char>(static_cast<const char*>(map),
-                                     [map, size = size_](const char*) { ::munmap(map, size); });
-
-  const std::string_view all(map_.get(), size_);
-  const int version = size_ > 12 && all.substr(0, 6) == npy_magic ? static_cast<unsigned char>(all[6]) : 0;
+  const std::string_view all = file_.bytes();
+  const std::size_t size = all.size();
+  const int version = size > 12 && all.substr(0, 6) == npy_magic ? static_cast<unsigned char>(all[6]) : 0;
   if (version < 1 || version > 3) refuse("this is no .npy file of a version that is known", "version 1, 2 or 3");
   std::size_t length = 0;
   for (int i = version == 1 ? 1 : 3; i >= 0; --i) {
     length = 256 * length + static_cast<unsigned char>(all[8 + static_cast<std::size_t>(i)]);
   }
   offset_ = (version == 1 ? 10 : 12) + length;
-  if (offset_ > size_) refuse("the file ends within its header", "the whole file");
+  if (offset_ > size) refuse("the file ends within its header", "the whole file");
   const std::string_view header = all.substr(offset_ - length, length);
 
   const std::string type(headerValue(header, "descr"));
@@ -103,17 +86,47 @@ NpyFile::NpyFile(const std::string& path) : name_(sourceName(path)) {
            "rows of 3, 4 or 7 numbers: shape (n, 4) for quaternions x y z w");
   }
   rows_ = sizes[0], columns_ = sizes[1];
-  const std::size_t row = columns_ * (single_ ? sizeof(float) : sizeof(double)), there = size_ - offset_;
+  const std::size_t row = columns_ * (single_ ? sizeof(float) : sizeof(double)), there = size - offset_;
   if (rows_ > there / row || rows_ * row != there) {
     refuse(fmt::format("{} bytes of numbers behind the header", there),
            fmt::format("{} rows of {} bytes: the file is truncated, or not finished", rows_, row));
   }
   if (rows_ == 0) refuse("the array has no rows", "at least one");
-  ::madvise(map, size_, MADV_SEQUENTIAL);
+}
+
+NpyFile::NpyFile(const std::string& path, std::string name, std::size_t columns)
+    : name_(std::move(name)), file_(path), rows_(bytes() / (columns * sizeof(double))), columns_(columns) {}
+
+RowsOnDisk::RowsOnDisk(std::size_t columns) : columns_(columns) {
+  const char* const directory = std::getenv("TMPDIR");
+  path_ = std::string(directory != nullptr && *directory != 0 ? directory : "/tmp") + "/liestat.XXXXXX";
+  file_ = ::mkostemp(path_.data(), O_CLOEXEC);
+  if (file_ < 0) throw InputError(path_, 0, std::string("cannot be written: ") + std::strerror(errno));
+  // Whatever ends the process, the file is gone with it.
+  ::unlink(path_.c_str());
+}
+RowsOnDisk::~RowsOnDisk() { ::close(file_); }
+
+void RowsOnDisk::add(const double* numbers, std::size_t rows) {
+  const auto* bytes = reinterpret_cast<const char*>(numbers);
+  for (std::size_t left = rows * columns_ * sizeof(double); left > 0;) {
+    const ssize_t count = ::write(file_, bytes, left);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) {
+      throw InputError(path_, 0, std::string("rows of a large file cannot be written: ") + std::strerror(errno),
+                       "room there, or another directory in TMPDIR");
+    }
+    bytes += count, left -= static_cast<std::size_t>(count);
+  }
+  rows_ += rows;
+}
+
+NpyFile RowsOnDisk::array(const std::string& name) const {
+  return {fmt::format("/proc/self/fd/{}", file_), name, columns_};
 }
 
 const double* NpyFile::doubles() const {
-  const char* const first = map_.get() + offset_;
+  const char* const first = file_.bytes().data() + offset_;
   return single_ || reinterpret_cast<std::uintptr_t>(first) % alignof(double) != 0
              ? nullptr
              : reinterpret_cast<const double*>(first);
@@ -121,7 +134,8 @@ const double* NpyFile::doubles() const {
 
 void NpyFile::read(std::size_t begin, std::size_t count, double* numbers) const {
   const std::size_t n = count * columns_;
-  const char* const from = map_.get() + offset_ + begin * columns_ * (single_ ? sizeof(float) : sizeof(double));
+  const char* const from =
+      file_.bytes().data() + offset_ + begin * columns_ * (single_ ? sizeof(float) : sizeof(double));
   if (!single_) {
     std::memcpy(numbers, from, n * sizeof(double));
     return;
@@ -131,6 +145,10 @@ void NpyFile::read(std::size_t begin, std::size_t count, double* numbers) const 
     std::memcpy(&x, from + i * sizeof x, sizeof x);
     numbers[i] = static_cast<double>(x);
   }
+}
+
+void NpyFile::forget(std::size_t end) const {
+  file_.forget(offset_ + end * columns_ * (single_ ? sizeof(float) : sizeof(double)));
 }
 
 Feature featureOfRows(const NpyFile& file, const std::optional<Feature>& wish) {

@@ -1,10 +1,10 @@
 // Arrays of numbers in NumPy's files (.npy), mapped into memory: rows of any number of gigabytes, which are not copied.
 #pragma once
 
+#include <formats/detail/mapped_file.hpp>
 #include <formats/features.hpp>
 
 #include <cstddef>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,21 +20,46 @@ class NpyFile {
 
   /// True if a file begins as .npy files do.
   static bool isOne(const std::string& path);
+  /// An array in a file that has nothing else.
+  NpyFile(const std::string& path, std::string name, std::size_t columns);
 
   const std::string& name() const { return name_; }
   std::size_t rows() const { return rows_; }
   std::size_t columns() const { return columns_; }
-  std::size_t bytes() const { return size_; }  ///< of the file
+  std::size_t bytes() const { return file_.bytes().size(); }  ///< of the file
   /// The rows where they lie, if they are aligned doubles; else null.
   const double* doubles() const;
   /// Copies rows begin … begin + count - 1.
   void read(std::size_t begin, std::size_t count, double* numbers) const;
+  /// The rows before this one take no memory until they are read again.
+  void forget(std::size_t end) const;
 
  private:
   std::string name_;
-  std::shared_ptr<const char> map_;
-  std::size_t size_ = 0, offset_ = 0, rows_ = 0, columns_ = 0;
+  detail::MappedFile file_;
+  std::size_t offset_ = 0, rows_ = 0, columns_ = 0;
   bool single_ = false;
+};
+
+/// Rows of doubles on their way into a file without a name, which is gone with the last NpyFile of it.
+class RowsOnDisk {
+ public:
+  /// In the directory TMPDIR, else /tmp. Throws InputError where that is not possible.
+  explicit RowsOnDisk(std::size_t columns);
+  ~RowsOnDisk();
+  RowsOnDisk(const RowsOnDisk&) = delete;
+  RowsOnDisk& operator=(const RowsOnDisk&) = delete;
+
+  /// Throws InputError where the disk is full.
+  void add(const double* numbers, std::size_t rows);
+  std::size_t rows() const { return rows_; }
+  /// All rows, of which there is one at least, as an array that messages call by that name.
+  NpyFile array(const std::string& name) const;
+
+ private:
+  std::string path_;
+  int file_ = -1;
+  std::size_t columns_, rows_ = 0;
 };
 
 /// The feature of an array's rows: four columns are quaternions x y z w, seven are TUM's without the time (tx ty tz qx

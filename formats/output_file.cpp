@@ -48,9 +48,8 @@ mode_t usualMode() {
   return 0666 & ~mask;
 }
 
-}  // namespace
-
-void writeOutput(const std::string& path, std::string_view content) {
+/// writeOutput() and writeDurably().
+void write(const std::string& path, std::string_view content, bool durably) {
   if (path == "-") {
     std::fflush(stdout);
     if (!writeAll(STDOUT_FILENO, content)) throwUnwritable("standard output", errno);
@@ -69,10 +68,12 @@ void writeOutput(const std::string& path, std::string_view content) {
     const std::filesystem::path resolved = std::filesystem::canonical(path, ignored);
     if (!ignored) target = resolved.string();
   }
-  std::string temporary = target + ".XXXXXX";
-  const int descriptor = ::mkstemp(temporary.data());
+  std::string temporary = target + (durably ? ".new" : ".XXXXXX");
+  const int descriptor =
+      durably ? ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode) : ::mkstemp(temporary.data());
   if (descriptor < 0) throwUnwritable(path, errno);
-  bool written = writeAll(descriptor, content) && ::fchmod(descriptor, mode) == 0;
+  bool written =
+      writeAll(descriptor, content) && ::fchmod(descriptor, mode) == 0 && (!durably || ::fsync(descriptor) == 0);
   int error = errno;
   if (::close(descriptor) != 0 && written) {
     written = false;
@@ -82,10 +83,23 @@ void writeOutput(const std::string& path, std::string_view content) {
     written = false;
     error = errno;
   }
-  if (written) return;
-  ::unlink(temporary.c_str());
-  throwUnwritable(path, error);
+  if (!written) {
+    ::unlink(temporary.c_str());
+    throwUnwritable(path, error);
+  }
+  if (!durably) return;
+  // The new name, too, is on the disk; not all file systems can say so of a directory.
+  const std::string directory = std::filesystem::path(target).parent_path().string();
+  const int of_directory = ::open(directory.empty() ? "." : directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (of_directory < 0) return;
+  ::fsync(of_directory);
+  ::close(of_directory);
 }
+
+}  // namespace
+
+void writeOutput(const std::string& path, std::string_view content) { write(path, content, false); }
+void writeDurably(const std::string& path, std::string_view content) { write(path, content, true); }
 
 void printLines(std::string_view text) {
   const std::string lines = printableLines(text);

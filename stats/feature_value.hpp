@@ -47,6 +47,7 @@ struct FeatureValue {
   std::optional<Eigen::Vector3d> velocity = {};         ///< m/s
   std::optional<Eigen::Vector3d> point = {};            ///< m
   std::optional<Eigen::Vector3d> direction = {};
+  std::optional<double> heading_deg = {};  ///< from 0 to 360
 };
 
 /// The parts that a feature has.
@@ -62,7 +63,8 @@ void describe(V& v, const FeatureValue& x) {
   part("velocity", x.velocity, "", "m/s");
   part("point", x.point, "", "m");
   part("direction", x.direction, "unit vector", "");
-  if (shown(v, !x.quaternion_xyzw && !x.point && !x.direction)) {
+  part("heading_deg", x.heading_deg, "from 0 to 360", "deg");
+  if (shown(v, !x.quaternion_xyzw && !x.point && !x.direction && !x.heading_deg)) {
     v("parameters", x.parameters, "of features that have none of these");
   }
 }
@@ -76,6 +78,11 @@ inline FeatureValue featureValue(Eigen::VectorXd parameters, std::span<const Tan
   };
   if (is(TangentPart::point, 3)) value.point = parameters;
   if (is(TangentPart::direction, 2)) value.direction = parameters;
+  if (parts.size() == 1 && parts[0].part == TangentPart::rotation && parts[0].size == 1 && size == 2) {
+    const double angle = std::atan2(parameters[1], parameters[0]) / units::degree;
+    const double turned = angle < 0 ? angle + 360 : angle;
+    value.heading_deg = turned < 360 ? turned : 0;  // of an angle that is nearly zero
+  }
   Eigen::Index expected = 4;
   bool rotates = false, known = true;
   for (const TangentBlock& block : parts) {

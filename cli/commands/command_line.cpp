@@ -180,16 +180,22 @@ int complain(const std::string& message) {
 }
 
 /// The complaint where mpirun or srun started several tasks, of which each would do all of the work; empty if they did
-/// not. A batch script of Slurm is no such task, and has SLURM_NTASKS alone.
-std::string faultOfTasks() {
+/// not, or the command line says which part of it is this task's. A batch script of Slurm is no such task, and has
+/// SLURM_NTASKS alone.
+std::string faultOfTasks(int argc, char** argv) {
+  const bool is_part = std::any_of(argv, argv + argc, [](const char* word) {
+    return std::string_view(word) == "--part" || std::string_view(word).starts_with("--part=");
+  });
+  if (is_part) return {};
   for (const char* const variable : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"}) {
     const char* const value = std::getenv(variable);
     double tasks = 0;
     if (value == nullptr || parseNumber(value, tasks) != NumberKind::finite || tasks < 2) continue;
     return fmt::format(
-        "liestat: started as {} tasks of mpirun or srun ({}), each of which would do all of the work: start one; MPI "
-        "is "
-        "of the headers (env -u {} where each task has work of its own)",
+        "liestat: started as {} tasks of mpirun or srun ({}), each of which would do all of the work: start one, or "
+        "give each its share of a validation by --part; MPI is of the headers (env -u {} where each task has work of "
+        "its "
+        "own)",
         printable(value), variable, variable);
   }
   return {};
@@ -234,6 +240,24 @@ std::string nearestOption(const CLI::ExtrasError& error, const CLI::App& app) {
   return nearest(typed, names);
 }
 
+/// Invocation::options.
+std::vector<std::string> givenOptions(const CLI::App& app) {
+  const CLI::App* command = &app;
+  std::string name;
+  while (!command->get_subcommands().empty()) {
+    command = command->get_subcommands().front();
+    name += (name.empty() ? "" : " ") + command->get_name();
+  }
+  std::vector<std::string> given;
+  for (const CLI::Option* option : command->get_options()) {
+    if (option->count() > 0)
+      given.push_back(fmt::format("{}={}", option->get_name(), fmt::join(option->results(), ",")));
+  }
+  std::sort(given.begin(), given.end());
+  given.insert(given.begin(), name);
+  return given;
+}
+
 int parseAndRun(int argc, char** argv, const std::vector<CommandGroup>& groups) {
   CLI::App app("Statistics of rotations, poses and other geometric features, with their uncertainty.", "liestat");
   app.set_version_flag("--version", "liestat " + std::string(programVersion()));
@@ -268,7 +292,7 @@ int parseAndRun(int argc, char** argv, const std::vector<CommandGroup>& groups) 
     if (error.get_exit_code() == 0) return app.exit(error);
     return complain("liestat: " + printable(error.what(), 1000) + " (liestat --help explains the usage)");
   }
-  const int code = (*chosen)({commandLine(argc, argv)});
+  const int code = (*chosen)({commandLine(argc, argv), givenOptions(app)});
   // A result that nobody could read is no success: the disk is full, or the pipe is closed.
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
     return complain(std::string("standard output: cannot be written: ") + std::strerror(errno));
@@ -284,7 +308,7 @@ int runCommandLine(int argc, char** argv, const std::vector<CommandGroup>& group
   } catch (const std::invalid_argument& error) {
     return complain(std::string("liestat: ") + error.what());
   }
-  if (const std::string fault = faultOfTasks(); !fault.empty()) return complain(fault);
+  if (const std::string fault = faultOfTasks(argc, argv); !fault.empty()) return complain(fault);
   try {
     return parseAndRun(argc, argv, groups);
   } catch (const InputError& error) {

@@ -31,6 +31,8 @@ enum ExitCode : int {
 /// The circumstances of a command's run, besides its options.
 struct Invocation {
   std::string command_line;  ///< as one could type it again
+  /// The command, and each option that was given as name=value[,value…], in order of the names.
+  std::vector<std::string> options = {};
 };
 
 // The parser of the command line behind a wall: CLI11's headers would cost each command five seconds of compile time, and

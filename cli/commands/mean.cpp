@@ -10,6 +10,7 @@
 #include <stats/mean_notes.hpp>
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -40,8 +41,12 @@ struct Options {
     if (analysis.region == MeanRegion::bootstrap) return "--region bootstrap";
     if (analysis.weights_are != ResidualNoise::precision) return "--weights-are";
     if (analysis.birge || analysis.refuted_noise == RefutedNoise::residuals) return "--birge and --refuted";
-    if (input.options.criterion.value_or(Criterion::lsq) != Criterion::lsq) return "--criterion";
+    if (input.options.criterion.value_or(Criterion::lsq) == Criterion::maha) return "--criterion maha";
     return nullptr;
+  }
+  /// The file is larger than the memory that it may take, and need not be in memory as a whole.
+  bool streams() const {
+    return hasFeatureChunks(input.file) && static_cast<double>(std::filesystem::file_size(input.file)) > 1e9 * memory;
   }
 };
 
@@ -95,15 +100,13 @@ int runCommand(const Options& options, const Invocation& invocation) {
   if (!with_state && !options.states.after.empty()) {
     throw OptionError("liestat mean", "--after without --state", "--state OUT, where the sums go");
   }
-  if (with_state || NpyFile::isOne(options.input.file)) {
-    const bool stream = !with_state && static_cast<double>(NpyFile(options.input.file).bytes()) > 1e9 * options.memory;
-    if (const char* const option = options.needsMemory(); option != nullptr && (with_state || stream)) {
-      throw OptionError("liestat mean", std::string(option) + " needs the measurements in memory",
-                        with_state ? "no --state" : "--memory with more GB than the file has");
-    }
-    if (with_state) return writeState(options.input, options.states, options.json, invocation);
-    if (stream) return streamMean(NpyFile(options.input.file), options.input, options.json, invocation);
+  const bool stream = !with_state && options.streams();
+  if (const char* const option = options.needsMemory(); option != nullptr && (with_state || stream)) {
+    throw OptionError("liestat mean", std::string(option) + " needs the measurements in memory",
+                      with_state ? "no --state" : "--memory with more GB than the file has");
   }
+  if (with_state) return writeState(options.input, options.states, options.json, invocation);
+  if (stream) return streamMean(options.input, options.json, invocation);
   AnalysisOptions how = options.analysis;
   std::string symmetry = options.symmetry;
   HexagonalAxes axes = options.axes.value_or(HexagonalAxes::x_along_a);
@@ -118,6 +121,9 @@ int runCommand(const Options& options, const Invocation& invocation) {
         "liestat mean",
         how.birge ? "--birge without the measurements' noise" : "--refuted residuals without the measurements' noise",
         "covariances in the file (columns cov_00 ...) that the mean uses");
+  }
+  if (measurements.feature == Feature::heading && !options.report.empty()) {
+    throw OptionError("liestat mean", "--report shows features in the plane and in space, and headings are a circle");
   }
   if (residuals && measurements.criterion == Criterion::maha) {
     throw OptionError("liestat mean", "--refuted residuals with maha, whose weights are the refuted covariances",
@@ -218,8 +224,9 @@ void addMeanCommand(const CommandList& app) {
   command.flag("--inflate", options->analysis.inflate,
                "Widen the covariance by the dependence of the rows' errors on time");
   command
-      .option("--memory", options->memory,
-              "GB of a .npy file beyond which it is left where it is, and read once a pass (default 1)")
+      .option(
+          "--memory", options->memory,
+          "GB of a file (.npy, or a text that is not compressed) beyond which it is not taken into memory (default 1)")
       .notNegative();
   command.option("--state", options->states.state,
                  "Write a state that liestat merge takes, of one pass over rotations or directions");

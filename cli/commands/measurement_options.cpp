@@ -29,9 +29,23 @@ void MeasurementInput::declare(const Command& app, bool file_required) {
   app.flag("--radians", radians, "Rotation vectors are in radians, those beyond a turn too").excludes(in_degrees);
 }
 
-Measurements MeasurementInput::read(const std::string& command) const {
+ReadingOptions MeasurementInput::howToRead() const {
   ReadingOptions how = reading;
   how.angles = degrees ? AngleUnit::degrees : radians ? AngleUnit::radians : AngleUnit::unsaid;
+  return how;
+}
+
+bool MeasurementInput::hasChunks() const { return hasFeatureChunks(file) && !NpyFile::isOne(file); }
+
+void MeasurementInput::readInChunks(const std::string& command,
+                                    const std::function<void(const Measurements&)>& take) const {
+  if (!hasChunks()) return take(read(command));
+  readFeatureChunks(file, howToRead(),
+                    [&](const FeatureFile& rows) { take(chooseMeasurements(rows, options, command)); });
+}
+
+Measurements MeasurementInput::read(const std::string& command) const {
+  const ReadingOptions how = howToRead();
   if (NpyFile::isOne(file)) {
     return chooseMeasurements(readNpyFeatures(NpyFile(file), options.feature, how.norm_tolerance), options, command);
   }

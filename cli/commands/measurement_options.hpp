@@ -3,6 +3,7 @@
 #include <cli/commands/command_line.hpp>
 #include <cli/commands/measurements.hpp>
 
+#include <functional>
 #include <string>
 
 namespace liestat::cli {
@@ -19,6 +20,14 @@ struct MeasurementInput {
   void declare(const Command& app, bool file_required);
   /// Reads the file; throws InputError. `command` begins the messages about options.
   Measurements read(const std::string& command) const;
+  /// Reads a text some thousand rows at a time, which go to take() and are forgotten; a text that cannot be mapped
+  /// (a pipe, a compressed one) is read as read() does. Throws InputError and OptionError.
+  void readInChunks(const std::string& command, const std::function<void(const Measurements& rows)>& take) const;
+  /// True if readInChunks() takes no more memory for a larger file.
+  bool hasChunks() const;
+
+ private:
+  ReadingOptions howToRead() const;
 };
 
 }  // namespace liestat::cli

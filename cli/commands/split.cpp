@@ -2,7 +2,7 @@
 
 #include <cli/commands/mean_input.hpp>
 #include <experiments/interruption.hpp>
-#include <experiments/parallel.hpp>
+#include <experiments/run_state.hpp>
 #include <stats/summarized_mean_splits.hpp>
 
 #include <concepts>
@@ -26,7 +26,7 @@ struct SplitExecutor {
       return program.reduce(n_chunks, map, combine);
     } else {
       bool cut = false;
-      return program.reduce(
+      return experiments::TrialExecutor{program.threads}.reduce(
           n_chunks, [&](std::size_t split) { return experiments::runStopped() ? Distances{} : map(split); },
           [&](Distances& all, const Distances& more) {
             // A split that began a little before the interrupt may come after one that did not.

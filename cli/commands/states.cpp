@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -67,8 +68,7 @@ struct StateMean {
     return hasMean() ? std::vector(mean.mean, mean.mean + dof + 1) : std::vector<double>();
   }
   double degrees() const {
-    const double angle = std::atan2(mean.mean[1], mean.mean[0]) / units::degree;
-    return angle < 0 ? angle + 360 : angle;
+    return *featureValue(Eigen::Vector2d(mean.mean[0], mean.mean[1]), tangentPartsOf<SO2d>()).heading_deg;
   }
   std::vector<double> deviations() const {
     std::vector<double> list;
@@ -124,23 +124,59 @@ int show(const StateFile& state, const std::string& json, const Invocation& invo
   return std::string(mean.mean.status) == "ok" ? exit_fine : exit_not_trusted;
 }
 
-/// Hands the rows of an array to add(numbers, how many), some at a time.
+/// Hands the rows of an array, with weights or none, to add(numbers, how many, their weights or null), some at a time.
 template <class Add>
-void forRows(const NpyFile& file, const Add& add) {
+void forRows(const NpyFile& file, const std::optional<NpyFile>& weights, const Add& add) {
   constexpr std::size_t most = 1 << 16;
   const double* const all = file.doubles();
   std::vector<double> some(all == nullptr ? most * file.columns() : 0);
   for (std::size_t i = 0; i < file.rows(); i += most) {
     const std::size_t n = std::min(most, file.rows() - i);
     if (all == nullptr) file.read(i, n, some.data());
-    add(all == nullptr ? some.data() : all + i * file.columns(), n);
+    add(all == nullptr ? some.data() : all + i * file.columns(), n, weights ? weights->doubles() + i : nullptr);
+    file.forget(i + n);
+    if (weights) weights->forget(i + n);
   }
 }
 
 int manifoldOf(Feature feature, const std::string& file) {
   if (feature == Feature::rotation) return LIESTAT_ROTATION;
   if (feature == Feature::direction) return LIESTAT_DIRECTION;
-  throw InputError(file, 0, fmt::format("{} have no states", info(feature).plural), "rotations or directions");
+  if (feature == Feature::heading) return LIESTAT_HEADING;
+  throw InputError(file, 0, fmt::format("{} have no states", info(feature).plural),
+                   "rotations, directions or headings; --memory with more GB takes others into memory");
+}
+
+/// An array, which has no weights.
+NpyFile arrayOf(const MeasurementInput& input) {
+  if (input.options.criterion == Criterion::wlsq) {
+    throw OptionError("liestat mean", "--criterion wlsq needs weights, and an array of features has none");
+  }
+  return NpyFile(input.file);
+}
+
+/// Hands rows of a text to add(measurements, numbers, how many, their weights or null), some thousand at a time.
+template <class Add>
+void forRows(const MeasurementInput& input, const Add& add) {
+  input.readInChunks("liestat mean", [&](const Measurements& rows) {
+    if (rows.known_noise) {
+      throw OptionError("liestat mean", "the measurements' covariances need the measurements in memory",
+                        "--memory with more GB, or --criterion lsq or wlsq");
+    }
+    const double* const weights = rows.usesWeights() ? rows.weights.data() : nullptr;
+    switch (manifoldOf(rows.feature, input.file)) {
+      case LIESTAT_ROTATION:
+        static_assert(sizeof(Eigen::Quaterniond) == 4 * sizeof(double));
+        return add(rows, rows.file.rotations.front().coeffs().data(), rows.size(), weights);
+      case LIESTAT_DIRECTION:
+        static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double));
+        return add(rows, rows.file.directions.front().data(), rows.size(), weights);
+      default:
+        std::vector<double> headings(2 * rows.size());
+        for (std::size_t i = 0; i < rows.size(); ++i) liestat_heading(rows.file.headings[i], &headings[2 * i]);
+        return add(rows, headings.data(), rows.size(), weights);
+    }
+  });
 }
 
 StateFile begin(int manifold, const StateOptions& options) {
@@ -164,27 +200,67 @@ StateFile begin(int manifold, const StateOptions& options) {
   return state;
 }
 
+/// Rows that stay on the disk.
+struct Streamed {
+  NpyFile rows;
+  std::optional<NpyFile> weights;
+  double largest_weight = 1;
+  Measurements about = {};  ///< without rows
+};
+
+/// An array as it is, and the rows of a text, read once, in a file of their own.
+Streamed streamed(const MeasurementInput& input) {
+  if (NpyFile::isOne(input.file)) {
+    Streamed result{arrayOf(input), std::nullopt};
+    result.about.feature = featureOfRows(result.rows, input.options.feature);
+    result.about.file.format = "npy";
+    return result;
+  }
+  std::optional<RowsOnDisk> numbers, weights;
+  double largest = 0;
+  Measurements about;
+  forRows(input, [&](const Measurements& rows, const double* row, std::size_t n, const double* weight) {
+    if (!numbers) {
+      numbers.emplace(rows.feature == Feature::rotation ? 4 : rows.feature == Feature::direction ? 3 : 2);
+      about.feature = rows.feature, about.criterion = rows.criterion, about.notes = rows.notes;
+      about.file.format = rows.file.format;
+    }
+    numbers->add(row, n);
+    if (weight == nullptr) return;
+    if (!weights) weights.emplace(1);
+    weights->add(weight, n);
+    largest = std::max(largest, *std::max_element(weight, weight + n));
+  });
+  const std::string name = sourceName(input.file);
+  Streamed result{numbers->array(name), std::nullopt, 1, std::move(about)};
+  if (weights) {
+    if (largest == 0) throw InputError(name, 0, "every weight is 0", "one above 0");
+    result.weights = weights->array(name), result.largest_weight = largest;
+  }
+  return result;
+}
+
 template <class M>
-int stream(const NpyFile& file, Feature feature, const std::string& json, const Invocation& invocation) {
-  MomentState<M> moments;
+int stream(const Streamed& data, const std::string& json, const Invocation& invocation) {
+  const NpyFile& file = data.rows;
+  MomentState<M> moments(data.largest_weight);
   const auto feed = [&](auto& state) {
-    forRows(file, [&](const double* rows, std::size_t n) {
-      const StateError error = state.add(rows, n);
+    forRows(file, data.weights, [&](const double* rows, std::size_t n, const double* weights) {
+      const StateError error = state.add(rows, n, MomentState<M>::row, weights);
       if (error != StateError::none) throw InputError(file.name(), 0, message(error));
     });
   };
   feed(moments);
-  SumState<M> sums(moments.finish().mean);
+  SumState<M> sums(moments.finish().mean, 1, data.largest_weight);
   feed(sums);
   for (CertifiedMean<M> mean = sums.finish(); sums.needsPass(mean); mean = sums.finish()) {
-    sums = SumState<M>(mean.mean.mean, sums.pass() + 1);
+    sums = SumState<M>(mean.mean.mean, sums.pass() + 1, data.largest_weight);
     feed(sums);
   }
   MeanAnalysis analysis{summarizedState(sums)};
-  analysis.feature = name(feature);
-  Measurements measurements;
-  measurements.feature = feature;
-  measurements.file.format = "npy";
+  analysis.feature = name(data.about.feature);
+  analysis.notes.insert(analysis.notes.begin(), data.about.notes.begin(), data.about.notes.end());
+  Measurements measurements = data.about;
   measurements.streamed = file.rows();
   publishResult(json, formatMean(file.name(), measurements, analysis), invocation.command_line, std::nullopt,
                 [&](JsonObject& object) {
@@ -199,38 +275,35 @@ int writeState(const MeasurementInput& input, const StateOptions& options, const
                const Invocation& invocation) {
   StateFile state;
   if (NpyFile::isOne(input.file)) {
-    const NpyFile file(input.file);
+    const NpyFile file = arrayOf(input);
     state = begin(manifoldOf(featureOfRows(file, input.options.feature), file.name()), options);
-    forRows(file, [&](const double* rows, std::size_t n) {
+    forRows(file, std::nullopt, [&](const double* rows, std::size_t n, const double*) {
       require(file.name(), liestat_state_add(state.words.data(), rows, n, file.columns(), nullptr));
     });
   } else {
-    const Measurements measurements = input.read("liestat mean");
-    if (measurements.known_noise) {
-      throw OptionError("liestat mean", "--state with the measurements' covariances", "--criterion lsq or wlsq");
-    }
-    state = begin(manifoldOf(measurements.feature, input.file), options);
-    const double* const weights = measurements.usesWeights() ? measurements.weights.data() : nullptr;
-    const auto add = [&](const double* rows, std::size_t n, std::size_t stride) {
-      require(input.file, liestat_state_add(state.words.data(), rows, n, stride, weights));
-    };
-    if (measurements.feature == Feature::rotation) {
-      static_assert(sizeof(Eigen::Quaterniond) == 4 * sizeof(double));
-      add(measurements.file.rotations.front().coeffs().data(), measurements.size(), 4);
-    } else {
-      static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double));
-      add(measurements.file.directions.front().data(), measurements.size(), 3);
-    }
+    bool begun = false;
+    forRows(input, [&](const Measurements& rows, const double* row, std::size_t n, const double* weights) {
+      const int manifold = manifoldOf(rows.feature, input.file);
+      if (!begun) state = begin(manifold, options);
+      begun = true;
+      require(input.file,
+              liestat_state_add(state.words.data(), row, n, static_cast<std::size_t>(manifold) + 1, weights));
+    });
   }
   save(options.state, state);
   return show(state, json, invocation);
 }
 
-int streamMean(const NpyFile& file, const MeasurementInput& input, const std::string& json,
-               const Invocation& invocation) {
-  const Feature feature = featureOfRows(file, input.options.feature);
-  if (manifoldOf(feature, file.name()) == LIESTAT_ROTATION) return stream<SO3d>(file, feature, json, invocation);
-  return stream<S2d>(file, feature, json, invocation);
+int streamMean(const MeasurementInput& input, const std::string& json, const Invocation& invocation) {
+  const Streamed data = streamed(input);
+  switch (manifoldOf(data.about.feature, data.rows.name())) {
+    case LIESTAT_ROTATION:
+      return stream<SO3d>(data, json, invocation);
+    case LIESTAT_DIRECTION:
+      return stream<S2d>(data, json, invocation);
+    default:
+      return stream<SO2d>(data, json, invocation);
+  }
 }
 
 void addMergeCommand(const CommandList& program) {
@@ -239,7 +312,8 @@ void addMergeCommand(const CommandList& program) {
     std::string out, json;
   };
   auto options = std::make_shared<Options>();
-  const Command command = program.add("merge", "The mean of states that liestat mean --state, SQLite or Python wrote");
+  const Command command =
+      program.add("merge", "The mean of states that liestat mean --state, an engine or Python wrote");
   command.option("STATES", options->files, "Files of states of one feature, kind and pass").required();
   command.option("--out", options->out, "Write the merged state to this file");
   command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");

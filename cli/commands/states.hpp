@@ -18,10 +18,9 @@ struct StateOptions {
 int writeState(const MeasurementInput& input, const StateOptions& options, const std::string& json,
                const Invocation& invocation);
 
-/// The mean of an array that is left where it is, in as many passes as that takes. Throws InputError for features
-/// without states.
-int streamMean(const NpyFile& file, const MeasurementInput& input, const std::string& json,
-               const Invocation& invocation);
+/// The mean of a file that is larger than the memory it may take, in as many passes as that takes: an array is left
+/// where it is, the rows of a text go to a file in TMPDIR. Throws InputError for features without states.
+int streamMean(const MeasurementInput& input, const std::string& json, const Invocation& invocation);
 
 /// `liestat merge`, as the commands of cli/commands/commands.hpp.
 void addMergeCommand(const CommandList& program);

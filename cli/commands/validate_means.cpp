@@ -305,6 +305,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   validation.certify = options.certify || options.run.full;
   validation.all_printed = options.run.full;
 
+  options.run.begin(invocation);
   MeansValidationResult result;
   result.rows = runTrials("validate means", [&](const auto& progress) { return validateMeans(validation, progress); });
   result.verdicts = runTrials("verdicts", [&](const auto& progress) {

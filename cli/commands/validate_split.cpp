@@ -17,6 +17,7 @@
 #include <filesystem>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -29,6 +30,7 @@ struct Options {
   MeasurementInput input;
   SplitSettings settings;
   std::string stereo, json, report;
+  SharedRun shared;
 };
 
 FileSplit splitFile(const Options& options) {
@@ -124,6 +126,7 @@ LandmarkSplits splitStereo(const Options& options) {
 
 template <class Split>
 int show(const Split& split, const Options& options, const Invocation& invocation) {
+  if (const std::optional<int> code = options.shared.end()) return *code;
   if (endedBeforeTrials()) return exit_interrupted;
   if (options.json != "-") printLines(formatSplit(split));
   if (!options.json.empty()) {
@@ -139,6 +142,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
     throw OptionError(command_name, "one input is needed, a FILE or --stereo PREFIX");
   }
   if (options.settings.split.blocks % 2 != 0) throw OptionError(command_name, "--blocks must be even");
+  options.shared.begin(invocation, {options.json, options.report});
   return options.stereo.empty() ? show(splitFile(options), options, invocation)
                                 : show(splitStereo(options), options, invocation);
 }
@@ -161,6 +165,7 @@ void addValidateSplitCommand(const CommandList& validate) {
   command.option("--threads", options->settings.threads, "Threads (default: all)").range(0, 4096);
   command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
   command.option("--report", options->report, "Write a page with plots into this directory");
+  options->shared.declare(command);
   command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 

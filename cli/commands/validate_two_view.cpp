@@ -253,6 +253,7 @@ int compareRules(const Options& options, const Invocation& invocation) {
 }
 
 int runCommand(const Options& options, const Invocation& invocation) {
+  options.run.begin(invocation);
   if (!options.pairs.empty()) return runPairs(options, invocation);
   if (options.rules) return compareRules(options, invocation);
   TwoViewValidation validation = options.validation;

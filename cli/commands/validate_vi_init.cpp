@@ -45,6 +45,7 @@ int runScene(const Options& options, const Invocation& invocation) {
 }
 
 int runCommand(const Options& options, const Invocation& invocation) {
+  options.run.begin(invocation);
   if (options.figure) return runScene(options, invocation);
   if (options.table1) return runTable1(options, invocation);
   ViInitValidation validation;
@@ -57,8 +58,9 @@ int runCommand(const Options& options, const Invocation& invocation) {
                                                   : validation.recordings;
   const auto rows =
       runTrials("validate vi-init", [&](const auto& progress) { return validateViInit(validation, progress); });
-  if (endedBeforeTrials()) return exit_interrupted;
-  if (rows.empty()) throw OptionError("--window", "none of these checks has windows of this length");
+  if (rows.empty() && experiments::trials_of_run.planned == 0) {
+    throw OptionError("--window", "none of these checks has windows of this length");
+  }
   return publish(options.run, invocation, viewOf(rows));
 }
 

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -54,6 +55,19 @@ auto runTrials(const std::string& label, const Run& run) {
   return withProgressBar(label, run);
 }
 
+/// Options of a run that is shared by machines, or that may be killed (experiments/run_state.hpp).
+struct SharedRun {
+  std::string part, state, checkpoint;
+  std::vector<std::string> merge;
+
+  void declare(const Command& command);
+  /// Begins the run: takes results over from files. Threads and the places where the results go, `results`, do not
+  /// belong to it. Throws OptionError and InputError.
+  void begin(const Invocation& invocation, const std::vector<std::string>& results) const;
+  /// Ends it: writes its file, and of a part says so and gives the exit code. Throws InputError.
+  std::optional<int> end() const;
+};
+
 /// Options that every validation takes.
 struct RunOptions {
   std::size_t trials = 0;  ///< 0: the default
@@ -61,6 +75,7 @@ struct RunOptions {
   int threads = 0;
   bool full = false;
   std::string json, report;  ///< the places where the rows go besides the terminal; empty: none
+  SharedRun shared = {};
 
   /// The size of a run with so many trials by default, and with --full.
   experiments::RunSize size(std::size_t usual, std::size_t all) const {
@@ -70,6 +85,8 @@ struct RunOptions {
 
   /// Declares them, but for --full; `usual` says in words how many trials are the default.
   void declare(const Command& command, const std::string& usual);
+  /// Before the first trial, see SharedRun.
+  void begin(const Invocation& invocation) const { shared.begin(invocation, {json, report}); }
 };
 
 /// Says so, and is true, if an interrupt came before any trial ended, so that there is nothing to show.
@@ -78,7 +95,8 @@ bool endedBeforeTrials();
 /// The exit code of a validation.
 int exitCode(bool passed);
 
-/// Shows a view on the terminal, in the JSON file and as the page that were asked for; returns the exit code.
+/// Shows a view on the terminal, in the JSON file and as the page that were asked for, unless the run is a part of one;
+/// returns the exit code.
 int publish(const RunOptions& options, const Invocation& invocation, const ValidationView& view);
 
 /// The options of a validation whose trials one function runs.
@@ -99,6 +117,7 @@ template <class Options, class Compute, class View>
 void runValidation(const Command& command, const std::shared_ptr<Options>& options, const std::string& label,
                    const Compute& compute, const View& viewOf) {
   command.run([=](const Invocation& invocation) {
+    options->run.begin(invocation);
     const auto result = runTrials(label, [&](const auto& progress) { return compute(*options, progress); });
     return publish(options->run, invocation, viewOf(result));
   });

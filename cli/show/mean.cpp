@@ -50,10 +50,12 @@ struct ShownPart {
   Eigen::Vector3d value;
   std::string unit;
   double per_sd = 1;  ///< units of the value in one of the part's standard deviation
+  int size = 3;
 };
 
 ShownPart shownPart(const TangentBlock& part, const FeatureValue& value) {
   if (isAngular(part.part)) {
+    if (value.heading_deg) return {"heading", {*value.heading_deg, 0, 0}, "deg", 1, 1};
     if (value.direction) return {"direction", *value.direction, "", 1 / degrees};
     return {"rotation vector", degrees * *value.rotation_vector, "deg"};
   }
@@ -82,7 +84,8 @@ TableRows meanRows(const Measurements& measurements, const MeanAnalysis& analysi
       least = shown.per_sd * *std::min_element(list.begin(), list.end());
     }
     std::vector<std::string> row{shown.name};
-    for (int i = 0; i < 3; ++i) row.push_back(withDigitsOf(shown.value[i], least));
+    for (int i = 0; i < shown.size; ++i) row.push_back(withDigitsOf(shown.value[i], least));
+    row.resize(4);
     row.push_back(shown.unit);
     rows.push_back(row);
     const std::string own_axes = analysis.mean.direction         ? ", tangent axes"
@@ -109,6 +112,7 @@ std::string oneLine(const FeatureValue& value) {
   add("translation", value.translation, 1, " m");
   add("point", value.point, 1, " m");
   add("direction", value.direction, 1, "");
+  if (value.heading_deg) text += fmt::format("heading {:.9g} deg", *value.heading_deg);
   return text;
 }
 

@@ -66,6 +66,8 @@ void findParts(const Header& header, FeatureColumns& found) {
   const bool has_translation = header.findGroup<3>({"tx", "ty", "tz"}, translation);
   const bool has_point = header.findGroup<3>({"x", "y", "z"}, point);
   const bool has_direction = header.findGroup<3>({"dx", "dy", "dz"}, found.direction);
+  found.heading = header.find("heading_deg");
+  const bool has_heading = found.heading != absent;
   const bool has_rotation = has_quaternion || has_rotation_vector || has_euler || has_matrix;
 
   std::vector<std::string> groups;  // those that may be a feature by themselves
@@ -75,11 +77,12 @@ void findParts(const Header& header, FeatureColumns& found) {
   if (has_matrix) groups.emplace_back("r00 ... r22");
   if (has_point) groups.emplace_back("x,y,z");
   if (has_direction) groups.emplace_back("dx,dy,dz");
+  if (has_heading) groups.emplace_back("heading_deg");
   if (groups.empty() && has_translation) {
     header.complain("tx,ty,tz without a rotation", "a rotation beside it, or x,y,z if these are points");
   }
   if (groups.empty()) header.complain("no columns of a feature", std::string(feature_columns_text));
-  const std::optional<Feature> pair = has_point && has_direction && !has_rotation
+  const std::optional<Feature> pair = has_point && has_direction && !has_rotation && !has_heading
                                           ? featureOf({FeaturePart::position, FeaturePart::direction})
                                           : std::nullopt;
   if (groups.size() > 1 && !pair) header.complain("the columns " + joined(groups, " and "), "one of them");
@@ -93,7 +96,9 @@ void findParts(const Header& header, FeatureColumns& found) {
     found.kind = *featureOf(has_translation ? FeatureParts(FeaturePart::rotation, FeaturePart::position)
                                             : FeatureParts(FeaturePart::rotation));
   } else {
-    found.kind = *featureOf(FeatureParts(has_point ? FeaturePart::position : FeaturePart::direction));
+    found.kind = *featureOf(FeatureParts(has_point     ? FeaturePart::position
+                                         : has_heading ? FeaturePart::heading
+                                                       : FeaturePart::direction));
   }
 }
 
@@ -150,7 +155,7 @@ const std::vector<std::string>& knownColumns() {
     std::vector<std::string> result = {"t",  "tx", "ty", "tz", "qx",   "qy",    "qz",
                                        "qw", "rx", "ry", "rz", "roll", "pitch", "yaw"};
     for (int i = 0; i < 9; ++i) result.push_back(fmt::format("r{}{}", i / 3, i % 3));
-    for (const char* column : {"x", "y", "z", "dx", "dy", "dz", "weight"}) result.emplace_back(column);
+    for (const char* column : {"x", "y", "z", "dx", "dy", "dz", "heading_deg", "weight"}) result.emplace_back(column);
     for (int i = 0; i < 6; ++i) {
       for (int j = i; j < 6; ++j) result.push_back(covarianceColumn(i, j));
       for (int j = 0; j < 6; ++j) result.push_back(factorColumn(i, j));

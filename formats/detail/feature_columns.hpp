@@ -16,7 +16,8 @@ inline constexpr int absent = -1;
 
 /// The columns of features, in words.
 inline constexpr std::string_view feature_columns_text =
-    "qx,qy,qz,qw or rx,ry,rz or roll,pitch,yaw or r00 ... r22 (with tx,ty,tz for frames), or x,y,z, or dx,dy,dz";
+    "qx,qy,qz,qw or rx,ry,rz or roll,pitch,yaw or r00 ... r22 (with tx,ty,tz for frames), or x,y,z, or dx,dy,dz, or "
+    "heading_deg";
 
 /// The columns that a CSV file of features may have.
 const std::vector<std::string>& knownColumns();
@@ -30,6 +31,7 @@ struct FeatureColumns {
   std::array<int, 9> matrix{absent, absent, absent, absent, absent, absent, absent, absent, absent};
   std::array<int, 3> position{absent, absent, absent};
   std::array<int, 3> direction{absent, absent, absent};
+  int heading = absent;
   int weight = absent;
   int time = absent;
   int dimension = 0;                 ///< the covariance's; 0: there is none

@@ -15,7 +15,8 @@ namespace liestat::detail {
 namespace {
 
 constexpr std::string_view known_columns_text =
-    "t; tx,ty,tz; qx,qy,qz,qw or rx,ry,rz or roll,pitch,yaw or r00 ... r22; x,y,z; dx,dy,dz; weight; cov_00 ... cov_55 "
+    "t; tx,ty,tz; qx,qy,qz,qw or rx,ry,rz or roll,pitch,yaw or r00 ... r22; x,y,z; dx,dy,dz; heading_deg; weight; "
+    "cov_00 ... cov_55 "
     "or "
     "factor_00 ... factor_55 or sd_0 ... sd_5";
 

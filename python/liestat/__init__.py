@@ -11,6 +11,7 @@ from ._manifolds import (
     SE2,
     SE3,
     SE23,
+    SO2,
     SO3,
     Frame3,
     Group,

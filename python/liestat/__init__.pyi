@@ -143,6 +143,11 @@ class SemiOrientedFrame3(_Frame):
 class NonOrientedFrame3(_Frame):
     def canonical(self) -> NonOrientedFrame3: ...
 
+class SO2(_Metric, Group):
+    @classmethod
+    def from_angle(cls, angle: ArrayLike, *, degrees: bool = False) -> SO2: ...
+    def as_angle(self, *, degrees: bool = False) -> Any: ...
+
 class SE2(Group):
     @classmethod
     def from_components(cls, translation: ArrayLike, angle: ArrayLike) -> SE2: ...
@@ -533,6 +538,7 @@ class _FeatureValue(Result):
     velocity: _Array  # m/s
     point: _Array  # m
     direction: _Array  # unit vector
+    heading_deg: float  # from 0 to 360; deg
     parameters: _Array  # of features that have none of these
 
 class _SplitHalf(Result):

@@ -5,7 +5,7 @@ import os
 import numpy as np
 
 from . import _core
-from ._manifolds import R3, S2, SE3, SE23, SO3, Frame3, NonOrientedFrame3, SemiOrientedFrame3
+from ._manifolds import R3, S2, SE3, SE23, SO2, SO3, Frame3, NonOrientedFrame3, SemiOrientedFrame3
 from ._results import Result
 from ._sensors import Camera
 
@@ -14,6 +14,7 @@ _KINDS = {
     "rotation": SO3,
     "frame": Frame3,
     "direction": S2,
+    "heading": SO2,
 }
 _POSES: tuple = (Frame3, SE3, SemiOrientedFrame3, NonOrientedFrame3)
 
@@ -72,7 +73,7 @@ def read_features(
     if of_file is Frame3:
         params = np.concatenate([d["rotations"], d["positions"]], axis=1)
     else:
-        params = d[{R3: "positions", SO3: "rotations", S2: "directions"}[of_file]]
+        params = d[{R3: "positions", SO3: "rotations", S2: "directions", SO2: "headings"}[of_file]]
 
     def present(array):
         return array if array.size else None

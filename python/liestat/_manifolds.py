@@ -817,6 +817,42 @@ class NonOrientedFrame3(_Frame, core="NonOrientedFrame3"):
         return type(self)._of(self._call("canonical", [], (7,)))
 
 
+class SO2(_Metric, Group, core="SO2"):
+    """Headings, rotations of the plane: angles of which 359° and 1° are neighbours, as cos sin.
+
+    Tangent vectors are angles (rad), shape (..., 1).
+
+    Examples
+    --------
+    >>> import liestat
+    >>> wind = liestat.SO2.from_angle([350, 355, 5, 10, 30], degrees=True)
+    >>> round(float(liestat.mean(wind).mean.as_angle(degrees=True)), 3)
+    6.0
+    """
+
+    __slots__ = ()
+    dimension = 2
+    tangent_names = ("r",)
+    _matrix = 2
+    _unit = slice(0, 2)
+    _origin = (1.0, 0.0)
+
+    @classmethod
+    def from_angle(cls, angle, *, degrees=False):
+        """From angles, shape (...), rad or degrees, of which multiples of 90° are exact."""
+        a = require_finite(as_numbers(angle, "SO2.from_angle: angle", ()), "angle")
+        if degrees:
+            return cls._of(_core.state_headings(np.ascontiguousarray(a).reshape(-1)).reshape(*a.shape, 2))
+        return cls._of(np.stack([np.cos(a), np.sin(a)], axis=-1))
+
+    def as_angle(self, *, degrees=False):
+        """Angles in [0, 2 pi), or in [0, 360)."""
+        a = np.arctan2(self._data[..., 1], self._data[..., 0])
+        turn = 360.0 if degrees else 2 * np.pi
+        a = np.where(a < 0, a + 2 * np.pi, a) * (turn / (2 * np.pi))
+        return np.where(a < turn, a, 0.0)[()]
+
+
 class SE2(Group, core="SE2"):
     """Rigid motions of the plane as a group: cos sin tx ty. Tangent vectors are (translation m, angle rad)."""
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import _core
-from ._manifolds import S2, SO3
+from ._manifolds import S2, SO2, SO3
 
 _MANIFOLDS = {"heading": 1, "direction": 2, "rotation": 3}
 _FEATURES = {number: name for name, number in _MANIFOLDS.items()}
@@ -61,13 +61,14 @@ class State:
         Rows that are not finite, or whose norm is off by more than 1e-3, are counted in `left_out`. Raises ValueError,
         and adds nothing, where a weight is not finite, negative or above the largest one.
         """
-        if isinstance(x, (S2, SO3)):
-            if not isinstance(x, S2 if self.feature == "direction" else SO3) or self.feature == "heading":
+        typed = isinstance(x, (SO2, S2, SO3))
+        if typed:
+            if not isinstance(x, (SO2, S2, SO3)[_MANIFOLDS[self.feature] - 1]):
                 raise ValueError(f"State.add: {type(x).__name__} for a state of {self.feature}s")
             x = x._data
         rows = np.asarray(x, dtype=np.float64)
         k = _MANIFOLDS[self.feature] + 1
-        if self.feature == "heading":
+        if self.feature == "heading" and not typed:
             shape = rows.shape
             rows = _core.state_headings(np.ascontiguousarray(rows).reshape(-1))
         elif rows.ndim == 0 or rows.shape[-1] != k:

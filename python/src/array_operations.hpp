@@ -51,6 +51,7 @@ struct ArrayType {
 ArrayType rotationOperations();
 ArrayType directionOperations();
 ArrayType pointOperations();
+ArrayType so2Operations();
 ArrayType se2Operations();
 ArrayType se3Operations();
 ArrayType se23Operations();

@@ -148,9 +148,9 @@ void bindArrays(py::module_& module) {
       .def_property_readonly("result", [](const BoundOperation& self) { return self.operation.result; });
 
   py::dict types;
-  for (const ArrayType& type :
-       {rotationOperations(), directionOperations(), pointOperations(), se2Operations(), se3Operations(),
-        se23Operations(), frameOperations(), semiOrientedFrameOperations(), nonOrientedFrameOperations()}) {
+  for (const ArrayType& type : {rotationOperations(), directionOperations(), pointOperations(), so2Operations(),
+                                se2Operations(), se3Operations(), se23Operations(), frameOperations(),
+                                semiOrientedFrameOperations(), nonOrientedFrameOperations()}) {
     types[text(type.name)] = py::make_tuple(type.parameters, type.dof, operationsOf(type));
   }
   module.attr("types") = types;

@@ -66,6 +66,7 @@ py::dict readFeatures(const std::string& path, const std::string& format, double
   });
   d["positions"] = rowsOf(file.positions, 3, vector3);
   d["directions"] = rowsOf(file.directions, 3, vector3);
+  d["headings"] = rowsOf(file.headings, 2, [](double degrees, double* out) { liestat_heading(degrees, out); });
   d["weights"] = python::arrayOf(file.weights, {static_cast<py::ssize_t>(file.weights.size())});
   d["times"] = python::arrayOf(file.times, {static_cast<py::ssize_t>(file.times.size())});
   d["lines"] = integers(std::vector<std::int64_t>(file.lines.begin(), file.lines.end()));

@@ -7,8 +7,8 @@ import numpy as np
 
 import liestat
 
-GROUPS = {"SO3": 3, "SE2": 3, "SE3": 6, "SE23": 9}
-METRIC = {"R3": 3, "S2": 2, "SO3": 3, "Frame3": 6, "SemiOrientedFrame3": 6, "NonOrientedFrame3": 6}
+GROUPS = {"SO2": 1, "SO3": 3, "SE2": 3, "SE3": 6, "SE23": 9}
+METRIC = {"R3": 3, "S2": 2, "SO2": 1, "SO3": 3, "Frame3": 6, "SemiOrientedFrame3": 6, "NonOrientedFrame3": 6}
 TYPES = {**GROUPS, **METRIC}
 
 

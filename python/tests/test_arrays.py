@@ -149,7 +149,7 @@ class Algebra(unittest.TestCase):
         for name in support.METRIC:
             with self.subTest(name):
                 x, y = support.features(name, 30), support.features(name, 30, seed=1)
-                by = support.features({"R3": "R3", "S2": "SO3", "SO3": "SO3"}.get(name, "SE3"), 30, seed=2)
+                by = support.features({"R3": "R3", "S2": "SO3", "SO2": "SO2", "SO3": "SO3"}.get(name, "SE3"), 30, seed=2)
                 np.testing.assert_allclose(x.moved(by).distance(y.moved(by)), x.distance(y), atol=1e-13)
 
     def test_quotients_forget_half_turns(self):

@@ -74,7 +74,7 @@ class Propagation(unittest.TestCase):
     def test_moved(self):
         for name, k in support.METRIC.items():
             with self.subTest(name):
-                by = support.features({"R3": "SE3", "S2": "SO3", "SO3": "SO3"}.get(name, "SE3"), 1, seed=3)[0]
+                by = support.features({"R3": "SE3", "S2": "SO3", "SO2": "SO2", "SO3": "SO3"}.get(name, "SE3"), 1, seed=3)[0]
                 x = Gaussian(support.features(name, 1)[0], covariance(k))
                 moved = x.moved(by)
                 self.assertTrue(moved.mean.allclose(x.mean.moved(by), 1e-12))

@@ -2,13 +2,14 @@
 
 import pathlib
 import pickle
+import tempfile
 import unittest
 
 import numpy as np
 import support
 
 import liestat
-from liestat import S2, SO3, State
+from liestat import S2, SO2, SO3, State
 
 STATES = pathlib.Path(__file__).resolve().parents[2] / "tests/data/states"
 
@@ -42,6 +43,30 @@ class States(unittest.TestCase):
                 wide[:, 3:7] = rows
                 self.assertEqual(bytes(State(feature).add(wide[::-1, 3:7])), golden)
             self.assertEqual(State.from_bytes(golden), State(feature).add(rows))
+
+    def test_headings_are_so2(self):
+        degrees = np.array([350.0, 355, 5, 10, 30])
+        x = SO2.from_angle(degrees, degrees=True)
+        self.assertEqual(bytes(State("heading").add(x)), bytes(State("heading").add(degrees)))
+        np.testing.assert_allclose(x.as_angle(degrees=True), degrees, atol=1e-13)
+        np.testing.assert_allclose(SO2.from_angle(np.deg2rad(degrees)).params, x.params, atol=1e-15)
+        np.testing.assert_array_equal(SO2.from_angle([90, -180.0], degrees=True).params, [[0, 1], [-1, 0]])
+        self.assertEqual(SO2.from_angle(-1e-300).as_angle(), 0)
+        mean = liestat.mean(x)
+        self.assertAlmostEqual(mean.mean.as_angle(degrees=True), 6, places=12)
+        self.assertEqual((mean.status, mean.unique, mean.covariance.shape), ("ok", "unique", (1, 1)))
+        # Opposite headings have two means.
+        self.assertNotEqual(liestat.mean(SO2.from_angle([0, 180.0], degrees=True)).status, "ok")
+        with self.assertRaisesRegex(ValueError, "SO2 for a state of rotations"):
+            State("rotation").add(x)
+        with self.assertRaises(ValueError):
+            SO2.from_angle([1.0, np.nan])
+        with tempfile.TemporaryDirectory() as directory:
+            path = pathlib.Path(directory) / "wind.csv"
+            path.write_text("heading_deg\n" + "\n".join(map(str, degrees)))
+            read = liestat.read_features(path).features
+            self.assertIsInstance(read, SO2)
+            np.testing.assert_array_equal(read.params, x.params)
 
     def test_passes_give_the_mean(self):
         x = support.features("SO3", 300)

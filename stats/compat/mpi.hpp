@@ -4,7 +4,7 @@
 // MPI::MPI_CXX).
 
 #include <lie/instruction_set.hpp>
-#include <stats/detail/chunk_codec.hpp>
+#include <stats/chunk_codec.hpp>
 #include <stats/executor.hpp>
 
 #include <mpi.h>
@@ -52,18 +52,18 @@ class MpiChannel {
   }
 
   /// Starts to send; `bytes` must live until the request is complete.
-  MPI_Request startSend(const Bytes& bytes, int to, int tag) const {
+  MPI_Request startSend(const ChunkBytes& bytes, int to, int tag) const {
     MPI_Request request;
     MPI_Isend(bytes.data(), mpiCount(bytes.size()), MPI_BYTE, to, tag, comm_, &request);
     return request;
   }
 
-  Bytes receive(int from, int tag) const {
+  ChunkBytes receive(int from, int tag) const {
     MPI_Status status;
     MPI_Probe(from, tag, comm_, &status);
     int count = 0;
     MPI_Get_count(&status, MPI_BYTE, &count);
-    Bytes bytes(static_cast<std::size_t>(count));
+    ChunkBytes bytes(static_cast<std::size_t>(count));
     MPI_Recv(bytes.data(), count, MPI_BYTE, from, tag, comm_, MPI_STATUS_IGNORE);
     return bytes;
   }
@@ -75,7 +75,7 @@ class MpiChannel {
   }
 
   /// From rank 0 to all.
-  void broadcast(Bytes& bytes) const {
+  void broadcast(ChunkBytes& bytes) const {
     unsigned long long size = bytes.size();
     MPI_Bcast(&size, 1, MPI_UNSIGNED_LONG_LONG, 0, comm_);
     bytes.resize(static_cast<std::size_t>(size));
@@ -94,18 +94,20 @@ class MpiChannel {
 enum class MpiOutcome : unsigned char { value = 0, exception = 1 };
 
 template <class Payload>
-Bytes mpiMessage(MpiOutcome outcome, const Payload& payload) {
+ChunkBytes mpiMessage(MpiOutcome outcome, const Payload& payload) {
   const auto content = std::as_bytes(std::span(payload));
-  Bytes message;
+  ChunkBytes message;
   message.reserve(content.size() + 1);
   message.push_back(static_cast<std::byte>(outcome));
   message.insert(message.end(), content.begin(), content.end());
   return message;
 }
 
-inline bool isException(const Bytes& message) { return message.at(0) == static_cast<std::byte>(MpiOutcome::exception); }
+inline bool isException(const ChunkBytes& message) {
+  return message.at(0) == static_cast<std::byte>(MpiOutcome::exception);
+}
 
-inline std::string mpiText(const Bytes& message) {
+inline std::string mpiText(const ChunkBytes& message) {
   std::string text;
   for (std::size_t i = 1; i < message.size(); ++i) text.push_back(static_cast<char>(message[i]));
   return text;
@@ -147,14 +149,14 @@ struct MpiExecutor {
   template <class Map, class Combine>
   detail::ChunkResult<Map> reduce(std::size_t n_chunks, Map&& map, Combine&& combine) const {
     using T = detail::ChunkResult<Map>;
-    static_assert(detail::ChunkCodec<T>::supported,
+    static_assert(ChunkCodec<T>::supported,
                   "MpiExecutor: give the chunk result members pack() and unpack(), see liestat::Packable");
     if (n_chunks == 0) return T{};
 
     const detail::MpiChannel channel(communicator);
     std::optional<T> result;
     std::exception_ptr mine;
-    detail::Bytes verdict;
+    ChunkBytes verdict;
 
     if (channel.rank() == 0) {
       verdict = gather(channel, n_chunks, map, combine, result, mine);
@@ -170,7 +172,7 @@ struct MpiExecutor {
       throw std::runtime_error(detail::mpiText(verdict));
     }
     if (result) return std::move(*result);
-    return detail::ChunkCodec<T>::decode(std::span(verdict).subspan(1));
+    return ChunkCodec<T>::decode(std::span(verdict).subspan(1));
   }
 
  private:
@@ -180,10 +182,10 @@ struct MpiExecutor {
 
   /// Rank 0: evaluates its own chunks, receives the others', combines; returns what to tell everybody.
   template <class T, class Map, class Combine>
-  static detail::Bytes gather(const detail::MpiChannel& channel, std::size_t n_chunks, Map& map, Combine& combine,
-                              std::optional<T>& result, std::exception_ptr& mine) {
+  static ChunkBytes gather(const detail::MpiChannel& channel, std::size_t n_chunks, Map& map, Combine& combine,
+                           std::optional<T>& result, std::exception_ptr& mine) {
     const auto ranks = static_cast<std::size_t>(channel.size());
-    const detail::Bytes nothing;
+    const ChunkBytes nothing;
     std::vector<MPI_Request> stops;
     std::string error;
     bool failed = false;
@@ -196,14 +198,14 @@ struct MpiExecutor {
     for (std::size_t chunk = 0; chunk < n_chunks; ++chunk) {
       const auto owner = static_cast<int>(chunk % ranks);
       // After a failure the other ranks' messages, one for each chunk, are still received, and thrown away.
-      const detail::Bytes message = owner == 0 ? detail::Bytes() : channel.receive(owner, result_tag);
+      const ChunkBytes message = owner == 0 ? ChunkBytes() : channel.receive(owner, result_tag);
       if (failed) continue;
       if (owner != 0 && detail::isException(message)) {
         fail(detail::mpiText(message));
         continue;
       }
       try {
-        T part = owner == 0 ? T(std::invoke(map, chunk)) : detail::ChunkCodec<T>::decode(std::span(message).subspan(1));
+        T part = owner == 0 ? T(std::invoke(map, chunk)) : ChunkCodec<T>::decode(std::span(message).subspan(1));
         if (result) {
           detail::combineInto(combine, *result, std::move(part));
         } else {
@@ -215,10 +217,10 @@ struct MpiExecutor {
       }
     }
 
-    detail::Bytes verdict;
+    ChunkBytes verdict;
     if (!failed) {
       try {
-        verdict = detail::mpiMessage(detail::MpiOutcome::value, detail::ChunkCodec<T>::encode(*result));
+        verdict = detail::mpiMessage(detail::MpiOutcome::value, ChunkCodec<T>::encode(*result));
       } catch (...) {
         mine = std::current_exception();
         fail(detail::describe(mine));
@@ -234,20 +236,19 @@ struct MpiExecutor {
   static std::exception_ptr contribute(const detail::MpiChannel& channel, std::size_t n_chunks, Map& map) {
     const auto ranks = static_cast<std::size_t>(channel.size());
     std::exception_ptr mine;
-    std::deque<std::pair<detail::Bytes, MPI_Request>> under_way;
+    std::deque<std::pair<ChunkBytes, MPI_Request>> under_way;
     const auto waitForOldest = [&under_way] {
       MPI_Wait(&under_way.front().second, MPI_STATUS_IGNORE);
       under_way.pop_front();
     };
 
     for (auto chunk = static_cast<std::size_t>(channel.rank()); chunk < n_chunks; chunk += ranks) {
-      detail::Bytes message;
+      ChunkBytes message;
       if (mine || channel.arrived(0, stop_tag)) {
         message = detail::mpiMessage(detail::MpiOutcome::exception, std::string("stopped"));
       } else {
         try {
-          message =
-              detail::mpiMessage(detail::MpiOutcome::value, detail::ChunkCodec<T>::encode(std::invoke(map, chunk)));
+          message = detail::mpiMessage(detail::MpiOutcome::value, ChunkCodec<T>::encode(std::invoke(map, chunk)));
           detail::mpiCount(message.size());
         } catch (...) {
           mine = std::current_exception();

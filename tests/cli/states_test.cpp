@@ -75,7 +75,10 @@ nlohmann::json jsonOf(const ProgramOutput& output) {
 double difference(const nlohmann::json& a, const nlohmann::json& b) {
   if (a.is_number()) return std::abs(a.get<double>() - b.get<double>());
   double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, difference(a[i], b[i]));
+  if (a.is_object()) {
+    for (const auto& [key, value] : a.items()) largest = std::max(largest, difference(value, b.at(key)));
+  }
+  for (std::size_t i = 0; a.is_array() && i < a.size(); ++i) largest = std::max(largest, difference(a[i], b[i]));
   return largest;
 }
 
@@ -138,6 +141,76 @@ TEST(MeanOfArrays, leavesBadRowsOutOfAStreamAndRefusesWhatIsNoArray) {
       contains(complaint(npy("'<f8'", shapeOf(7), bytesOf<double>(rows(7))), {"--memory", "0"}), "have no states"));
   EXPECT_TRUE(
       contains(complaint(good, {"--memory", "0", "--report", directory / "r"}), "--report needs the measurements"));
+}
+
+/// Headings about north, every third with another weight.
+std::string headings(bool weighted) {
+  std::string text = weighted ? "heading_deg,weight\n" : "heading_deg\n";
+  for (std::size_t i = 0; i < n; ++i) {
+    const double angle = std::remainder(static_cast<double>(i * 7919 % 500) / 10 - 20, 360);
+    text += fmt::format("{}{}\n", angle < 0 ? angle + 360 : angle, !weighted ? "" : i % 3 == 0 ? ",0.25" : ",3");
+  }
+  return text;
+}
+
+TEST(MeanOfText, inAStreamIsThatInMemory) {
+  const TemporaryDirectory directory;
+  std::string weighted;
+  std::size_t row = 0;
+  for (const char c : csv(rows(4), 4)) {
+    weighted += c == '\n' ? (row++ == 0 ? ",weight\n" : row % 3 == 0 ? ",0.25\n" : ",3\n") : std::string(1, c);
+  }
+  for (const std::string& text :
+       {csv(rows(4), 4), csv(rows(3), 3), weighted, headings(false), headings(true), csv(rows(4), 4) + "# end\n\n"}) {
+    const std::string file = directory.write("f.csv", text);
+    const nlohmann::json known = jsonOf(run({"mean", file, "--json", "-"}));
+    const ProgramOutput streamed = run({"mean", file, "--memory", "0", "--json", "-"});
+    ASSERT_EQ(streamed.exit_code, 0) << streamed.error << text.substr(0, 30);
+    const nlohmann::json found = jsonOf(streamed);
+    for (const char* field : {"feature", "criterion", "format", "n", "status", "unique"}) {
+      EXPECT_EQ(found[field], known[field]) << field << " of " << text.substr(0, 30);
+    }
+    EXPECT_LE(difference(found["mean"], known["mean"]), 1e-10) << found["mean"] << known["mean"];
+    EXPECT_LE(difference(found["covariance"], known["covariance"]), 1e-9 * known["covariance"][0][0].get<double>());
+    EXPECT_LE(difference(found["dispersion"], known["dispersion"]), 1e-12);
+    EXPECT_FALSE(known["covariance"].is_null());
+  }
+}
+
+TEST(MeanOfText, streamsWhatHasAStateAndSaysWhatNeedsMemory) {
+  const TemporaryDirectory directory;
+  const auto complaint = [&](const std::string& text, const Words& more = {}) {
+    const ProgramOutput output = run(Words{"mean", directory.write("f.csv", text), "--memory", "0"} + more);
+    EXPECT_EQ(output.exit_code, 2) << output.output;
+    return output.error;
+  };
+  EXPECT_TRUE(contains(complaint("x,y,z\n1,2,3\n"), "points have no states"));
+  EXPECT_TRUE(contains(complaint("qx,qy,qz,qw,sd_0,sd_1,sd_2\n0,0,0,1,.1,.1,.1\n"), "need the measurements in memory"));
+  EXPECT_TRUE(contains(complaint("heading_deg\n1\n", {"--criterion", "maha"}), "--criterion maha needs"));
+  EXPECT_TRUE(contains(complaint("heading_deg\n1\n", {"--criterion", "wlsq"}), "needs a column weight"));
+  EXPECT_TRUE(contains(complaint("heading_deg,weight\n1,0\n2,0\n"), "every weight is 0"));
+  EXPECT_TRUE(contains(complaint(csv(rows(4), 4) + "1,0,0\n"), ":502: 3 fields"));
+  EXPECT_TRUE(contains(complaint("heading_deg\n1\nnorth\n"), ":3: heading_deg is 'north', expected a number"));
+  EXPECT_TRUE(contains(complaint("heading_deg,x,y,z\n1,0,0,0\n"), "the columns x,y,z and heading_deg"));
+  EXPECT_TRUE(contains(complaint(csv(rows(4), 4), {"--feature", "heading"}), "does not fit a file of rotations"));
+  EXPECT_TRUE(contains(run({"mean", directory.write("f.csv", headings(false)), "--report", directory / "r"}).error,
+                       "headings are a circle"));
+  const std::string array = directory.write("f.npy", npy("'<f8'", shapeOf(4), bytesOf<double>(rows(4))));
+  EXPECT_TRUE(contains(run({"mean", array, "--memory", "0", "--criterion", "wlsq"}).error, "needs weights"));
+}
+
+TEST(MeanOfHeadings, isTheDirectionThatPeopleMean) {
+  const TemporaryDirectory directory;
+  const std::string file = directory.write("wind.csv", "heading_deg\n350\n355\n5\n10\n30\n");
+  const nlohmann::json found = jsonOf(run({"mean", file, "--json", "-"}));
+  EXPECT_NEAR(found["mean"]["heading_deg"].get<double>(), 6, 1e-12);
+  EXPECT_EQ(found["feature"], "heading");
+  EXPECT_EQ(found["covariance"].size(), 1U);
+  const ProgramOutput shown = run({"mean", file});
+  EXPECT_TRUE(contains(shown.output, "5 headings (csv)") && contains(shown.output, "heading")) << shown.output;
+  // The state is the one that SQLite and Python make of the same column: docs/sqlite.md's example is 5.913.
+  ASSERT_NE(run({"mean", file, "--state", directory / "s"}).exit_code, 2);
+  EXPECT_TRUE(contains(run({"merge", directory / "s"}).output, "chordal mean 5.91"));
 }
 
 TEST(MeanState, mergesToTheMeanOfAllInAFewPasses) {

@@ -171,10 +171,32 @@ std::pair<std::string, std::string> verdictOf(const ValidationRun& run, const Su
   return {last, before};
 }
 
+/// The same run by parts, with other numbers of threads: the text and the JSON are those of the whole run.
+void expectPartsMerge(const std::string& command, const ValidationRun& whole) {
+  const TemporaryDirectory directory;
+  const auto run = [&](const std::string& options) {
+    return runProgram(
+        Words{"sh", "-c", "\"$@\" > out.txt", "sh", LIESTAT_PROGRAM, "validate"} + wordsOf(command + " " + options),
+        directory.path().string());
+  };
+  for (int k = 1; k <= 3; ++k) {
+    const ProgramResult part = run(fmt::format("--part {}/3 --state {}.state --threads {}", k, k, 1 + k % 2));
+    ASSERT_EQ(part.status, 0) << command << ": " << part.errors;
+  }
+  const ProgramResult merged = run("--merge 3.state 1.state 2.state --json out.json");
+  EXPECT_EQ(merged.errors, "") << command;
+  EXPECT_EQ(merged.status, whole.result.status) << command;
+  EXPECT_EQ(contentOf(directory / "out.txt"), whole.text) << command;
+  Json json = Json::parse(contentOf(directory / "out.json")), all = whole.json;
+  json.erase("command_line"), all.erase("command_line");
+  EXPECT_EQ(json.dump(), all.dump()) << command;
+}
+
 TEST(Validate, WritesWhatIsDescribedAndSaysTheSameEverywhere) {
   for (const Subject& subject : subjects()) {
     const ValidationRun run(subject.command);
     ASSERT_EQ(run.result.status, 0) << subject.command << "\n" << run.text << run.result.errors;
+    if (subject.command.find("--scene") == std::string::npos) expectPartsMerge(subject.command, run);
     const std::string word = verdictOf(run, subject).first;
     EXPECT_EQ(run.json["seed"], 1) << subject.command;
     EXPECT_EQ(run.json.contains("passed"), subject.promises) << subject.command;
@@ -266,6 +288,7 @@ TEST(ValidateSplit, SaysTheSameEverywhereAndAfterAnInterrupt) {
   EXPECT_NE(whole.text.find("\nPASSED: "), std::string::npos) << whole.text;
   EXPECT_NE(whole.page.find("<p class=\"verdict good\">✓ PASSED: "), std::string::npos);
   EXPECT_EQ(whole.json["passed"], true);
+  expectPartsMerge("split " + file + " --splits 20", whole);
   for (const std::string& name : fields<SplitSummary>()) {
     const bool interrupted = name == "interrupted" || name.starts_with("trials_");
     EXPECT_EQ(whole.json.contains(name), !interrupted) << name;

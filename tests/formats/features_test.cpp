@@ -92,6 +92,52 @@ TEST(Reading, Directions) {
   EXPECT_EQ(Eigen::Matrix2d(file.covariances[0]), expected);
 }
 
+TEST(Reading, Headings) {
+  const FeatureFile file = read("t,heading_deg,weight,sd_0\n0,-90,1,0.1\n1,3690.5,2,0.2\n");
+  EXPECT_EQ(file.kind, Feature::heading);
+  EXPECT_EQ(file.headings, (std::vector<double>{-90, 3690.5}));
+  EXPECT_EQ(file.covariances[1](0, 0), 0.2 * 0.2);
+  EXPECT_NE(errorIn("heading_deg,tx,ty,tz\n1,0,0,0\n").find("tx,ty,tz beside heading_deg"), std::string::npos);
+  EXPECT_NE(errorIn("heading_deg,cov_00,cov_01\n1,1,0\n").find("column 'cov_01' in a file of headings"),
+            std::string::npos);
+  // Of no use to a mean: see FeatureFile::unmeasured.
+  EXPECT_EQ(read("heading_deg,cov_00\n1,-1\n2,1\n").unmeasured, (std::vector<std::size_t>{0}));
+}
+
+TEST(Reading, ChunksAreTheWholeFile) {
+  const TemporaryDirectory directory;
+  for (const char* end : {"\n", "\r\n"}) {
+    for (const std::size_t n : {1U, 32768U, 70000U}) {
+      std::string text = "# a comment\ndx,dy,dz,weight";
+      for (std::size_t i = 0; i < n; ++i) {
+        text += end + std::string(i % 1000 == 7 ? end : "") + "0,0.6,0.8," + std::to_string(i);
+      }
+      if (n == 1) text += "1";  // a weight of zero alone is refused
+      const FeatureFile whole = read(text);
+      FeatureFile sum;
+      std::size_t chunks = 0;
+      readFeatureChunks(directory.write("f.csv", text), {}, [&](const FeatureFile& rows) {
+        ++chunks;
+        EXPECT_EQ(rows.kind, Feature::direction);
+        EXPECT_EQ(rows.format, "csv");
+        sum.directions.insert(sum.directions.end(), rows.directions.begin(), rows.directions.end());
+        sum.weights.insert(sum.weights.end(), rows.weights.begin(), rows.weights.end());
+        sum.lines.insert(sum.lines.end(), rows.lines.begin(), rows.lines.end());
+      });
+      EXPECT_EQ(chunks, (n + 32767) / 32768);
+      EXPECT_EQ(sum.lines, whole.lines);
+      EXPECT_EQ(sum.weights, whole.weights);
+      EXPECT_EQ(sum.directions, whole.directions);
+    }
+  }
+  const auto complaint = [&](const std::string& text) {
+    return errorOf([&] { readFeatureChunks(directory.write("g.csv", text), {}, [](const FeatureFile&) {}); });
+  };
+  EXPECT_NE(complaint("x,y,z\n1,2,3\n1,2\n").find("g.csv:3: 2 fields"), std::string::npos);
+  EXPECT_NE(complaint("x,y,z\n").find("there is a header but no data"), std::string::npos);
+  EXPECT_NE(complaint("").find("cannot be mapped"), std::string::npos);
+}
+
 TEST(Reading, CovarianceOfFramesHasTheUpperTriangle) {
   std::string header = "tx,ty,tz,qx,qy,qz,qw";
   std::string row = "0,0,0,0,0,0,1";
@@ -269,7 +315,8 @@ TEST(Reading, TextThatIsNone) {
 }
 
 const std::string known =
-    "t; tx,ty,tz; qx,qy,qz,qw or rx,ry,rz or roll,pitch,yaw or r00 ... r22; x,y,z; dx,dy,dz; weight; cov_00 ... cov_55 "
+    "t; tx,ty,tz; qx,qy,qz,qw or rx,ry,rz or roll,pitch,yaw or r00 ... r22; x,y,z; dx,dy,dz; heading_deg; weight; "
+    "cov_00 ... cov_55 "
     "or "
     "factor_00 ... factor_55 or sd_0 ... sd_5";
 const std::string or_else = " (--ignore-unknown passes over others, --columns maps names)";

@@ -1,5 +1,5 @@
-// Results of chunks as bytes and back, for executors whose chunks are evaluated in other processes. Needs no such
-// executor's package.
+// Results of chunks as bytes and back, for executors whose chunks are evaluated in other processes, or at other times. Needs
+// no such executor's package.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,9 +26,12 @@ namespace detail {
 template <class T>
 concept FixedSizeEigen = std::derived_from<T, Eigen::PlainObjectBase<T>> && T::SizeAtCompileTime != Eigen::Dynamic;
 
-using Bytes = std::vector<std::byte>;
+}  // namespace detail
 
-/// T as bytes and back, for the types that MpiExecutor can send. Machines of one run share one byte order.
+using ChunkBytes = std::vector<std::byte>;
+
+/// T as bytes and back, for the types that MpiExecutor can send: trivially copyable ones, vectors of them, Eigen's of fixed
+/// size, and Packable ones. Machines of one run share one byte order. decode() takes what encode() gave.
 template <class T>
 struct ChunkCodec;
 
@@ -37,8 +40,8 @@ template <class U>
 struct ChunkCodec<std::vector<U>> {
   static constexpr bool supported = true;
 
-  static Bytes encode(const std::vector<U>& values) {
-    Bytes bytes(sizeof(U) * values.size());
+  static ChunkBytes encode(const std::vector<U>& values) {
+    ChunkBytes bytes(sizeof(U) * values.size());
     if (!bytes.empty()) std::memcpy(bytes.data(), values.data(), bytes.size());
     return bytes;
   }
@@ -51,17 +54,17 @@ struct ChunkCodec<std::vector<U>> {
 
 template <class T>
 struct ChunkCodec {
-  static constexpr bool supported = Packable<T> || FixedSizeEigen<T> || std::is_trivially_copyable_v<T>;
+  static constexpr bool supported = Packable<T> || detail::FixedSizeEigen<T> || std::is_trivially_copyable_v<T>;
 
-  static Bytes encode(const T& value) {
+  static ChunkBytes encode(const T& value) {
     if constexpr (Packable<T>) {
       return ChunkCodec<std::vector<double>>::encode(value.pack());
-    } else if constexpr (FixedSizeEigen<T>) {
-      Bytes bytes(sizeof(typename T::Scalar) * T::SizeAtCompileTime);
+    } else if constexpr (detail::FixedSizeEigen<T>) {
+      ChunkBytes bytes(sizeof(typename T::Scalar) * T::SizeAtCompileTime);
       std::memcpy(bytes.data(), value.data(), bytes.size());
       return bytes;
     } else {
-      Bytes bytes(sizeof(T));
+      ChunkBytes bytes(sizeof(T));
       std::memcpy(bytes.data(), &value, bytes.size());
       return bytes;
     }
@@ -70,7 +73,7 @@ struct ChunkCodec {
   static T decode(std::span<const std::byte> bytes) {
     if constexpr (Packable<T>) {
       return T::unpack(ChunkCodec<std::vector<double>>::decode(bytes));
-    } else if constexpr (FixedSizeEigen<T>) {
+    } else if constexpr (detail::FixedSizeEigen<T>) {
       T value;
       std::memcpy(value.data(), bytes.data(), bytes.size());
       return value;
@@ -82,5 +85,4 @@ struct ChunkCodec {
   }
 };
 
-}  // namespace detail
 }  // namespace liestat
