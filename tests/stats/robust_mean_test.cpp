@@ -74,21 +74,17 @@ TEST(RobustMean, theMedianIsAMinimum) {
 }
 
 TEST(RobustMean, theMedianMayBeADatum) {
-  // Of a star with an odd number of rays the middle is the median, and no other step of Weiszfeld's ends there.
-  for (const int rays : {3, 5, 11}) {
-    std::vector<S2d> x;
-    const S2d middle(0, 0, 1);
-    for (int i = 0; i < rays; ++i) {
-      const double turn = 2 * M_PI * i / rays;
-      x.push_back(exp(middle, Eigen::Vector2d(0.5 * std::cos(turn), 0.5 * std::sin(turn))));
-    }
-    x.push_back(exp(middle, Eigen::Vector2d(1e-3, 0)));
-    x.push_back(middle);
+  // Opposite pairs about a datum cancel; two others pull with a force below one, which that datum holds. Weiszfeld's steps
+  // alone would approach it at that rate: 1400 of them at 0.98. Starts are data of even index here.
+  const S2d held(0, 0, 1);
+  const auto at = [&](double turn) { return exp(held, Eigen::Vector2d(0.5 * std::cos(turn), 0.5 * std::sin(turn))); };
+  for (const double force : {0.2, 0.9, 0.98, 0.999}) {
+    const double ray = std::acos(0.5 * force);
+    std::vector<S2d> x{at(ray), held, at(-ray)};
+    for (int i = 0; i < 23; ++i) x.push_back(at(0.27 * i)), x.push_back(at(0.27 * i + M_PI));
     const RobustMean<S2d> median = robustMean(x, RobustLoss::median);
-    // The datum beside it pulls with a force of one, which its own just holds.
-    EXPECT_LT(distance(median.mean, middle), 1e-3) << rays;
-    EXPECT_LT(median.iterations, 200) << rays;
-    EXPECT_LE(distances(x, median.mean), distances(x, middle) + 1e-12) << rays;
+    EXPECT_LT(distance(median.mean, held), 1e-12) << force;
+    EXPECT_LT(median.iterations, 100) << force;
   }
 }
 
