@@ -16,7 +16,7 @@ int main() {
   std::vector<SO3d> measured;
   for (int i = 0; i < 40; ++i) measured.push_back(exp(truth, Eigen::Vector3d(units::degree * rng.normalVector<3>())));
   // A tenth is wrong in any way.
-  for (const std::size_t i : {3, 11, 25, 38}) {
+  for (const std::size_t i : {3U, 11U, 25U, 38U}) {
     measured[i] = SO3d::exp(Eigen::Vector3d(rng.uniform(1, 3) * rng.unitVector<3>()));
   }
 
