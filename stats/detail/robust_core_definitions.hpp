@@ -400,9 +400,10 @@ bool judgePart(const RobustData& data, const TangentBlock& part, const PartLoss&
   result.shift_p =
       std::min({result.shift_p, chiSquaredTail(t2, K), clumpProbability<K>(rows, bulk), holeProbability<K>(rows)});
 
+  const double family = n * static_cast<double>(data.parts.size());
   for (Eigen::Index i = 0; i < rows.cols(); ++i) {
     const double r = bulk.mahalanobis(rows.col(i));
-    const double p = n * hotellingTail(r * r * n / (n + 1), K, 0.5 * n);
+    const double p = family * hotellingTail(r * r * n / (n + 1), K, 0.5 * n);
     if (p < options.outlier_level) {
       result.outliers.push_back({static_cast<std::size_t>(i), part.part, rows.col(i).norm(), p});
     }
