@@ -12,7 +12,7 @@
 set(LIESTAT_COMPILED_PARTS means estimation fusion trajectories formats)
 
 set(LIESTAT_COMPILED_SOURCES_means
-    mean maha crystal_mean certified_mean certified_maha certified_group_mean state state_finish)
+    mean maha crystal_mean certified_mean certified_maha certified_group_mean robust_mean state state_finish)
 set(LIESTAT_COMPILED_SOURCES_estimation constrained implicit_ekf fits)
 set(LIESTAT_COMPILED_SOURCES_fusion
     initialisation initialisation_truth recording noise_calibration homography_models epipolar_models pose_models

@@ -7,6 +7,7 @@
 #include <stats/certified_mean.hpp>
 #include <stats/laws.hpp>
 #include <stats/random.hpp>
+#include <stats/robust_mean.hpp>
 
 #include <fmt/format.h>
 
@@ -47,6 +48,13 @@ class Sampler {
            cell_.law == VerdictLaw::normal;
   }
 
+  /// The loss of a robust mean, if that is judged.
+  std::optional<RobustLoss> loss() const {
+    if (cell_.law == VerdictLaw::huber_uniform || cell_.law == VerdictLaw::huber_cluster) return RobustLoss::huber;
+    if (cell_.law == VerdictLaw::median_uniform || cell_.law == VerdictLaw::median_cluster) return RobustLoss::median;
+    return std::nullopt;
+  }
+
   /// The population's mean, or all of them: points of a circle or sphere about the origin.
   const std::vector<M>& truths() const { return truths_; }
 
@@ -54,6 +62,7 @@ class Sampler {
     constexpr int k = ManifoldTraits<M>::DoF, angles = std::min(k, 3);
     if (cell_.law == VerdictLaw::fisher) return fisher_.draw(rng);
     if (isTurned()) return drawTurned(rng);
+    if (loss()) return drawContaminated(i, rng);
     TangentOf<M> e = rng.template normalVector<k>();
     if (isBootstrapped()) {
       for (int j = 0; j < k; ++j) e[j] = 0.05 * skewed(e[j]);
@@ -90,6 +99,26 @@ class Sampler {
   bool isTurned() const {
     return cell_.law == VerdictLaw::flips || cell_.law == VerdictLaw::half_turns || cell_.law == VerdictLaw::outliers;
   }
+  /// Normal errors with outliers: the first of the measurements.
+  M drawContaminated(std::size_t i, CounterRng& rng) const {
+    constexpr double sd = 0.1;
+    constexpr int k = ManifoldTraits<M>::DoF, angles = std::min(k, 3);
+    TangentOf<M> e = sd * rng.template normalVector<k>();
+    const bool uniform = cell_.law == VerdictLaw::huber_uniform || cell_.law == VerdictLaw::median_uniform;
+    if (static_cast<double>(i) < (uniform ? cell_.parameter : 0.2) * static_cast<double>(cell_.n)) {
+      if (uniform) {
+        const M anywhere = FisherLaw<M>(0).draw(rng);
+        e = logOfOrigin(anywhere);
+        for (int j = 0; j < k - angles; ++j) e[j] = rng.uniform(-2, 2);
+      } else {
+        TangentOf<M> away = TangentOf<M>::Zero();
+        away[0] = away[k - 1] = cell_.parameter * sd * (k == angles ? std::sqrt(0.5) : 1);
+        e = away + 0.1 * e;
+      }
+    }
+    return exp(ManifoldTraits<M>::origin(), e);
+  }
+  static TangentOf<M> logOfOrigin(const M& x) { return log(ManifoldTraits<M>::origin(), x); }
   /// An error of mean 0 and variance 1 from a standard normal one.
   double skewed(double z) const {
     if (cell_.law == VerdictLaw::normal) return z;
@@ -164,6 +193,7 @@ class CrystalSampler {
 
   std::vector<Eigen::Matrix3d> statedNoise() const { return {}; }
   bool isBootstrapped() const { return false; }
+  std::optional<RobustLoss> loss() const { return std::nullopt; }
   const std::vector<CrystalOrientation>& truths() const { return truths_; }
   CrystalOrientation draw(std::size_t, CounterRng& rng) const {
     using T = ManifoldTraits<CrystalOrientation>;
@@ -186,11 +216,25 @@ struct Outcome {
   bool widened = false, inconsistent = false;
 };
 
+template <class M>
+Outcome judgeRobust(const std::vector<M>& samples, RobustLoss loss, const M& truth, double quantile) {
+  const RobustMean<M> result = robustMean(samples, loss);
+  const auto misses = [&](const Gaussian<M>& estimate) { return !(mahalanobisSquared(estimate, truth) <= quantile); };
+  const MeanResult<M> plain = mean(samples);
+  return {.ok = result.status == Status::ok,
+          .ambiguous = result.status == Status::ambiguous,
+          .ill_defined = result.status == Status::ill_defined,
+          .outside = result.estimate && misses(*result.estimate),
+          .plain_outside = misses({plain.mean, covarianceFromResiduals(plain)}),
+          .inconsistent = result.status == Status::inconsistent};
+}
+
 template <class M, class Draws>
 Outcome judgeTrial(const Draws& sampler, double quantile, std::size_t n, CounterRng& rng) {
   std::vector<M> samples;
   samples.reserve(n);
   for (std::size_t i = 0; i < n; ++i) samples.push_back(sampler.draw(i, rng));
+  if (sampler.loss()) return judgeRobust(samples, *sampler.loss(), sampler.truths().front(), quantile);
   CertifiedMeanOptions<M> options;
   // A certificate that is not found changes no verdict; a rival that is, is found early.
   options.uniqueness.budget = 200'000;
@@ -269,9 +313,10 @@ void giveVerdict(VerdictRow& row) {
 }  // namespace
 
 std::string name(VerdictLaw law) {
-  constexpr const char* names[] = {"fisher",        "report",      "isotropic",  "clouds", "flips",
-                                   "half_turns",    "outliers",    "strip",      "lever",  "stated",
-                                   "stated_clouds", "exponential", "log_normal", "normal"};
+  constexpr const char* names[] = {"fisher",         "report",        "isotropic",     "clouds", "flips",
+                                   "half_turns",     "outliers",      "strip",         "lever",  "stated",
+                                   "stated_clouds",  "exponential",   "log_normal",    "normal", "huber_uniform",
+                                   "median_uniform", "huber_cluster", "median_cluster"};
   return names[static_cast<std::size_t>(law)];
 }
 
@@ -296,6 +341,17 @@ VerdictPromise promiseOf(const VerdictCell& cell) {
     return promise;
   }
   promise.max_outside = 0.07;
+  if (cell.law == VerdictLaw::huber_uniform || cell.law == VerdictLaw::median_uniform) {
+    promise.min_coverage = 0.93;
+    promise.min_kept = 0.85;
+    return promise;
+  }
+  // A cluster within the noise of 20 measurements is not told from it.
+  if (cell.law == VerdictLaw::huber_cluster || cell.law == VerdictLaw::median_cluster) {
+    if (x < 4 && cell.n < 50) promise.max_outside = std::nullopt;
+    if (cell.n >= 50) promise.max_outside = 0.03;
+    return promise;
+  }
   if (cell.law == VerdictLaw::stated) {
     promise.max_inconsistent = 0.01;
     promise.min_coverage = 0.93;
@@ -378,6 +434,11 @@ std::vector<VerdictCell> verdictCells(bool full) {
     cells.push_back({Feature::rotation, VerdictLaw::stated_clouds, 179, 40, 200});
     add_cell(Feature::direction, VerdictLaw::exponential, 0, 20, 400);
     add_cell(Feature::rotation, VerdictLaw::log_normal, 1, 50, 400);
+    for (const Feature feature : {Feature::direction, Feature::rotation, Feature::frame, Feature::non_oriented_frame}) {
+      for (const double part : {0.0, 0.3}) add_cell(feature, VerdictLaw::huber_uniform, part, 20, 400);
+      add_cell(feature, VerdictLaw::huber_cluster, 12, 20, 200);
+      add_cell(feature, VerdictLaw::median_uniform, 0.3, 20, 200);
+    }
     for (const char* group : {"432", "622"}) {
       add_crystals(group, VerdictLaw::fisher, 0, 10, 200);
       add_crystals(group, VerdictLaw::isotropic, 0.2, 10, 400);
@@ -390,6 +451,19 @@ std::vector<VerdictCell> verdictCells(bool full) {
       add_cell(feature, VerdictLaw::normal, 0, n, 2000);
       add_cell(feature, VerdictLaw::exponential, 0, n, 2000);
       for (const double s : {0.5, 1.0}) add_cell(feature, VerdictLaw::log_normal, s, n, 2000);
+    }
+  }
+  for (const Feature feature : {Feature::direction, Feature::rotation, Feature::frame, Feature::semi_oriented_frame,
+                                Feature::non_oriented_frame}) {
+    for (const std::size_t n : {20, 50, 200}) {
+      for (const double part : {0.0, 0.1, 0.2, 0.3}) {
+        add_cell(feature, VerdictLaw::huber_uniform, part, n, 2000);
+        add_cell(feature, VerdictLaw::median_uniform, part, n, 2000);
+      }
+      for (const double away : {2.0, 3.0, 4.0, 6.0, 12.0}) {
+        add_cell(feature, VerdictLaw::huber_cluster, away, n, 2000);
+        add_cell(feature, VerdictLaw::median_cluster, away, n, 2000);
+      }
     }
   }
   for (const char* group : {"2", "222", "3", "32", "4", "422", "6", "622", "23", "432"}) {

@@ -12,7 +12,7 @@
 
 namespace liestat::experiments {
 
-/// The verdicts of certifiedMean: what it hands out a covariance for, what it withholds one from, and whether the
+/// The verdicts of certifiedMean and robustMean: what it hands out a covariance for, what it withholds one from, and whether the
 /// regions of those that it hands out hold the truth. Where `validate means` judges the formulas on means that were
 /// started at the truth, this judges the front door, with its own starts and its own refusals.
 
@@ -34,7 +34,12 @@ enum class VerdictLaw {
   exponential,    ///< independent exponential errors about their mean in each coordinate, 0.05 rad and m; the region is
                   ///< that of a bootstrap, as for the two laws below
   log_normal,     ///< the same of log-normal errors, the parameter the standard deviation of the logarithm
-  normal          ///< the same of normal errors
+  normal,         ///< the same of normal errors
+  huber_uniform,  ///< normal in the chart, 0.1 rad and m, of which this fraction is uniform, translations within 2 m;
+                  ///< judged is Huber's mean, as below
+  median_uniform,  ///< the same for the geodesic median
+  huber_cluster,   ///< a fifth in a cluster the parameter times 0.1 rad and m away, a tenth as wide
+  median_cluster   ///< the same for the geodesic median
 };
 /// The name in tables and JSON fields.
 std::string name(VerdictLaw law);

@@ -55,7 +55,16 @@ inline void addMeanNotes(MeanSummary& mean, std::size_t measurements) {
                      " standard deviations): they are no inverse variances, and the covariance supposes that they "
                      "are; importance has a covariance without that");
   }
-  if (mean.skewness.matters() && mean.fromResiduals() && mean.region == MeanRegion::law) {
+  if (isRobust(mean.criterion) && !mean.outliers.empty()) {
+    std::string note = std::to_string(mean.outliers.size()) +
+                       (mean.outliers.size() == 1 ? " measurement is an outlier" : " outliers are named");
+    const NamedOutlier& surest = mean.outliers.front();
+    note += ", the surest " + significant(surest.shown(), 3) + " " + unitOf(surest.part).name +
+            " from the mean (p = " + significant(surest.p, 2) + ")";
+    mean.notes.push_back(std::move(note));
+  }
+  // Outliers skew the sample; whether they lie on one side is a test of the mean itself.
+  if (mean.skewness.matters() && !isRobust(mean.criterion) && mean.fromResiduals() && mean.region == MeanRegion::law) {
     addDoubt(none, "the errors are skewed or have heavy tails (Mardia's skewness " + significant(mean.skewness.b, 2) +
                        ", p = " + significant(mean.skewness.p, 1) +
                        "): the 95 % region is that of symmetric noise, and too small for so few skewed errors; region "

@@ -31,8 +31,11 @@
 namespace liestat {
 
 /// The criterion of a mean: least squares, weighted least squares, least Mahalanobis distances; the barycentre is a Lie
-/// group's.
-enum class Criterion { lsq, wlsq, maha, barycentre };
+/// group's; robust ones are Huber's mean and the geodesic median.
+enum class Criterion { lsq, wlsq, maha, barycentre, huber, median };
+
+/// True for the robust ones.
+constexpr bool isRobust(Criterion criterion) { return criterion == Criterion::huber || criterion == Criterion::median; }
 
 /// The name in options and fields.
 inline std::string name(Criterion criterion) {
@@ -45,6 +48,10 @@ inline std::string name(Criterion criterion) {
       return "maha";
     case Criterion::barycentre:
       return "barycentre";
+    case Criterion::huber:
+      return "huber";
+    case Criterion::median:
+      return "median";
   }
   return "unknown";
 }
@@ -79,6 +86,29 @@ void describe(V& v, const FarthestMeasurement& x) {
   v("part", name(x.part), "of the tangent vector")("distance", x.shown(), "from the mean")("unit", unitOf(x.part).name);
   if (shown(v, x.line.has_value())) v("line", x.line.value_or(0), "of the file");
   if (shown(v, !x.line)) v("index", x.index, "among the measurements, if they are from no file");
+}
+
+/// A measurement that normal noise of the others' scatter does not explain, of a robust mean.
+struct NamedOutlier : FarthestMeasurement {
+  double p = 1;  ///< the probability of such a one among all measurements
+};
+
+template <class V>
+void describe(V& v, const NamedOutlier& x) {
+  describe(v, static_cast<const FarthestMeasurement&>(x));
+  v("p", x.p, "probability of such a one among all measurements of normal noise");
+}
+
+/// The scale of a robust mean's measurements in one part of the tangent vector.
+struct PartScale {
+  TangentPart part = TangentPart::point;
+  double scale = 0;  ///< along an axis, rad, m or m/s
+};
+
+template <class V>
+void describe(V& v, const PartScale& x) {
+  v("part", name(x.part), "of the tangent vector")("scale", unitOf(x.part).scale * x.scale, "along an axis");
+  v("unit", unitOf(x.part).name);
 }
 
 /// A mean with its certificates and its covariance, whatever the type. Matrices are empty where there are none.
@@ -135,6 +165,10 @@ struct MeanSummary {
   std::optional<NearRival> valley = {};
   double valley_angle = 0;  ///< from the mean, rad
 
+  std::vector<NamedOutlier> outliers = {};  ///< of a robust mean, the surest first
+  std::vector<PartScale> scales = {};       ///< of a robust mean
+  double shift_p = 1;  ///< robust: the probability of outliers so much on one side if errors are symmetric
+
   NoiseFit fit = {};          ///< of the measurements to the noise that is stated for them
   bool noise_scaled = false;  ///< the covariance is multiplied by fit.factor()
 
@@ -189,7 +223,7 @@ void describe(V& v, const MeanSummary& m) {
     v("symmetry", m.symmetry,
       "orientations of crystals: the proper point group that they are modulo; R and R k are equal");
   }
-  v("criterion", name(m.criterion), "lsq, wlsq, maha or barycentre");
+  v("criterion", name(m.criterion), "lsq, wlsq, maha, barycentre, huber or median");
   v("covariance_at", where(m.covariance_at.has_value(), std::string(name(m.covariance_at.value_or(CovarianceAt{})))),
     "frame of the measurements' covariances; null where it does not matter");
   v("likelihood", m.likelihood, "whether the volume element is in the criterion");
@@ -244,6 +278,11 @@ void describe(V& v, const MeanSummary& m) {
     "by which the confidence region was widened to the features that explain the data as well; 1: not at all");
   v("valley", m.valley, "the farthest of these that was found, on a ring or in a valley; null without");
   v("valley_angle", where(m.valley.has_value(), m.valley_angle), "its angle from the mean", "rad");
+  if (shown(v, isRobust(m.criterion))) {
+    v("scales", m.scales, "of a robust mean: the median distance from the geodesic median over that of a normal law");
+    v("outliers", m.outliers, "of a robust mean: measurements with a family-wise p below 0.05, the surest first");
+    v("shift_p", m.shift_p, "of a robust mean: probability of outliers so much on one side if errors are symmetric");
+  }
   v("fit", where(fits, m.fit.chi2), "χ² of the measurements under the noise that is stated for them; null: not tested");
   v("fit_dof", where(fits, m.fit.degrees_of_freedom), "its degrees of freedom");
   v("fit_p", where(fits, m.fit.p), "probability of so large a χ²; below 0.001 the stated noise is refuted");

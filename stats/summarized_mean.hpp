@@ -16,6 +16,7 @@
 #include <stats/detail/mean_dependence.hpp>
 #include <stats/dispersion.hpp>
 #include <stats/mean_summary.hpp>
+#include <stats/robust_mean.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -68,6 +69,13 @@ struct MeanInput {
     if (wrong(times.size(), false)) return sentence("times", times.size());
     const auto finite = [](double t) { return std::isfinite(t); };
     if (!std::all_of(times.begin(), times.end(), finite)) return "times that are not finite";
+    if (isRobust(criterion)) {
+      if constexpr (!Metric<M> && !HasMetricTwin<M>) return "a robust mean of a type without a metric";
+      if (weighted()) return "a robust mean of weighted features";
+      if (!covariances.empty()) return "a robust mean of features with covariances, which it does not use";
+      if (inflate || region != MeanRegion::law)
+        return "a robust mean with inflate or a bootstrap, which it does not have";
+    }
     if (criterion == Criterion::maha && covariances.empty()) return "a Mahalanobis mean without covariances";
     if constexpr (std::is_same_v<M, CrystalOrientation>) {
       if (criterion == Criterion::maha) return "a Mahalanobis mean of orientations of crystals, which have none";
@@ -265,6 +273,39 @@ void setLeastSquares(MeanSummary& mean, const E& executor, const MeanInput<M>& i
   if (result.n > 0) mean.dispersion = result.dispersion().template cast<double>();
 }
 
+/// Huber's mean and the median; of rigid motions those of their frames, whose covariances have the same axes.
+template <class M>
+void setRobust(MeanSummary& mean, const MeanInput<M>& input) {
+  if constexpr (Metric<M>) {
+    const RobustMean<M> result =
+        robustMean(input.features, input.criterion == Criterion::huber ? RobustLoss::huber : RobustLoss::median);
+    setIteration(mean, result);
+    mean.converged = converged(result.status) || (result.status == Status::too_few && result.n > 0);
+    mean.status = mean.covariance_status =
+        result.status == Status::too_few && result.n > 0 ? Status::not_applicable : result.status;
+    mean.reason = result.reason;
+    mean.unique = result.unique ? Uniqueness::unique : Uniqueness::not_certified;
+    mean.proof = result.proof;
+    if (result.rival) mean.near_ties.push_back({featureValue(*result.rival), result.rival_z});
+    const std::vector<TangentBlock> parts = robustParts<M>();
+    for (std::size_t b = 0; b < result.scales.size(); ++b) mean.scales.push_back({parts[b].part, result.scales[b]});
+    for (const RobustOutlier& x : result.outliers) mean.outliers.push_back({{x.part, x.distance, x.index}, x.p});
+    mean.shift_p = result.shift_p;
+    if (result.estimate) mean.covariance = result.estimate->covariance.template cast<double>();
+    setDispersion(mean, input, result.mean);
+  } else if constexpr (HasMetricTwin<M>) {
+    using Twin = std::remove_cvref_t<decltype(ManifoldTraits<M>::metricTwin(input.features[0]))>;
+    std::vector<Twin> twins;
+    twins.reserve(input.features.size());
+    for (const M& x : input.features) twins.push_back(ManifoldTraits<M>::metricTwin(x));
+    setRobust(mean, MeanInput<Twin>{.criterion = input.criterion, .features = twins});
+    if (mean.n > 0) mean.mean = featureValue(M(ManifoldTraits<M>::fromMetricTwin(featureOf<Twin>(mean.mean))));
+    for (NearRival& tie : mean.near_ties) {
+      tie.feature = featureValue(M(ManifoldTraits<M>::fromMetricTwin(featureOf<Twin>(tie.feature))));
+    }
+  }
+}
+
 template <LieGroup G, Executor E>
 void setBarycentre(MeanSummary& mean, const E& executor, const MeanInput<G>& input, const MeanSummaryOptions& options) {
   const bool ones = input.weights.empty();
@@ -348,6 +389,10 @@ MeanSummary summarizedMean(const E& executor, const MeanInput<M>& input, const M
   }
   if constexpr (std::is_same_v<M, CrystalOrientation>) {
     if (!input.features.empty()) mean.symmetry = input.features.front().group().name();
+  }
+  if (isRobust(input.criterion)) {
+    detail::setRobust(mean, input);
+  } else if constexpr (std::is_same_v<M, CrystalOrientation>) {
     detail::setLeastSquares(mean, any, input, options);
   } else if (input.criterion == Criterion::maha) {
     detail::setMahalanobis(mean, any, input, options);
@@ -358,7 +403,7 @@ MeanSummary summarizedMean(const E& executor, const MeanInput<M>& input, const M
   }
   mean.noise_scaled = input.scale_noise && mean.known_noise && mean.hasCovariance() && mean.fit.tested();
   if (mean.noise_scaled && !options.certificates) mean.covariance *= mean.fit.factor();
-  detail::setTimeDependence(mean, input);
+  if (!isRobust(input.criterion)) detail::setTimeDependence(mean, input);
   if constexpr (std::is_same_v<M, S2<ScalarOf<M>>>) {
     const M y = featureOf<M>(mean.mean);
     mean.tangent_basis = ManifoldTraits<M>::placement(y).matrix().template leftCols<2>().template cast<double>();

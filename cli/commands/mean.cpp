@@ -27,6 +27,7 @@ struct Options {
   AnalysisOptions analysis;
   bool no_certify = false;
   std::string symmetry, phase;
+  std::optional<Criterion> robust;
   std::optional<HexagonalAxes> axes;
   std::string json, report;
   StateOptions states;
@@ -36,6 +37,7 @@ struct Options {
   const char* needsMemory() const {
     if (!report.empty()) return "--report";
     if (!symmetry.empty()) return "--symmetry";
+    if (robust) return "--robust";
     if (isEbsdName(input.file)) return "a map of orientations";
     if (analysis.inflate) return "--inflate";
     if (analysis.region == MeanRegion::bootstrap) return "--region bootstrap";
@@ -95,7 +97,26 @@ Measurements readMap(const Options& options, std::string& symmetry, HexagonalAxe
   return measurements;
 }
 
-int runCommand(const Options& options, const Invocation& invocation) {
+/// The options with the robust criterion, whose covariance has no variants.
+Options withCriterion(Options options) {
+  if (!options.robust) return options;
+  const AnalysisOptions& how = options.analysis;
+  const char* const other = options.input.options.criterion               ? "--criterion"
+                            : how.inflate                                 ? "--inflate"
+                            : how.region != MeanRegion::law               ? "--region"
+                            : how.weights_are != ResidualNoise::precision ? "--weights-are"
+                            : how.birge                                   ? "--birge"
+                            : how.refuted_noise != RefutedNoise::withheld ? "--refuted"
+                                                                          : nullptr;
+  if (other != nullptr) {
+    throw OptionError("liestat mean", std::string("--robust with ") + other, "--robust without it");
+  }
+  options.input.options.criterion = options.robust;
+  return options;
+}
+
+int runCommand(const Options& given, const Invocation& invocation) {
+  const Options options = withCriterion(given);
   const bool with_state = !options.states.state.empty();
   if (!with_state && !options.states.after.empty()) {
     throw OptionError("liestat mean", "--after without --state", "--state OUT, where the sums go");
@@ -212,6 +233,8 @@ void addMeanCommand(const CommandList& app) {
                   {"importance", ResidualNoise::importance},
                   {"frequency", ResidualNoise::frequency}},
                  "Meaning of the weights: precision (inverse variances, default), importance or frequency (counts)");
+  command.choice<Criterion>("--robust", options->robust, {{"huber", Criterion::huber}, {"median", Criterion::median}},
+                            "Huber's mean or the geodesic median, which outliers do not break");
   command.choice(
       "--region", options->analysis.region, {{"law", MeanRegion::law}, {"bootstrap", MeanRegion::bootstrap}},
       "The region of a covariance from residuals: Hotelling's law (default), or widened by a bootstrap where "

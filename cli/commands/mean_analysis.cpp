@@ -51,6 +51,7 @@ MeanAnalysis analyse(const Measurements& measurements, const AnalysisOptions& op
   MeanAnalysis analysis{summarizedMean(experiments::ProgramExecutor{options.threads}, input, how)};
   analysis.feature = name(measurements.feature);
   for (FarthestMeasurement& f : analysis.farthest) f.line = measurements.file.lines[f.index];
+  for (NamedOutlier& x : analysis.outliers) x.line = measurements.file.lines[x.index];
   return analysis;
 }
 

@@ -55,6 +55,8 @@ Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& opti
     m.criterion = Criterion::barycentre;
     if (options.criterion == Criterion::maha) {
       m.criterion = Criterion::maha;
+    } else if (options.criterion && isRobust(*options.criterion)) {
+      m.criterion = *options.criterion;
     } else if (options.criterion) {
       refuse("--criterion " + name(*options.criterion) +
              " needs an invariant metric, which rigid motions have not: leave it out for the group's barycentre, or "

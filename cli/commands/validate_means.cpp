@@ -21,7 +21,8 @@ namespace {
 
 std::string verdictTable(const std::vector<VerdictRow>& verdicts) {
   std::string text =
-      "\nVerdicts of certifiedMean, % of the trials: ok, of these outside of the 95 % region (miss), on the wrong\n"
+      "\nVerdicts of certifiedMean and of robust means, % of the trials: ok, of these outside of the 95 % region "
+      "(miss), on the wrong\n"
       "side (wrong); coverage of what is ok (cover) and of first-order covariances never withheld (plain);\n"
       "what is missing refutes the covariances that are stated\n";
   Table table({"feature, law", "n", "ok", "ambig", "ill", "miss", "wrong", "cover", "plain", ""});

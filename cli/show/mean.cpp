@@ -28,6 +28,10 @@ std::string criterionInWords(const Measurements& measurements) {
              (!measurements.covariance_at_matters                    ? ""
               : measurements.covariance_at == CovarianceAt::measured ? ", covariances in the frames of the measurements"
                                                                      : ", covariances in the frame of the mean");
+    case Criterion::huber:
+      return "Huber's loss of geodesic distances";
+    case Criterion::median:
+      return "least geodesic distances (the median)";
     case Criterion::barycentre:
       break;
   }
@@ -179,6 +183,15 @@ std::string formatMean(const std::string& source, const Measurements& measuremen
                         oneLine(analysis.valley->feature), degrees * analysis.valley_angle, analysis.valley->z);
   }
   text += "covariance   " + covarianceInWords(measurements, analysis) + "\n";
+  constexpr std::size_t most_outliers = 10;
+  for (std::size_t i = 0; i < std::min(most_outliers, analysis.outliers.size()); ++i) {
+    const NamedOutlier& x = analysis.outliers[i];
+    text += fmt::format("{}line {}: {:.4g} {} away, p {:.2g}\n", i == 0 ? "outliers     " : "             ",
+                        x.line.value_or(0), x.shown(), unitOf(x.part).name, x.p);
+  }
+  if (analysis.outliers.size() > most_outliers) {
+    text += fmt::format("             and {} more\n", analysis.outliers.size() - most_outliers);
+  }
   if (analysis.dependence.tested) {
     text += "in time      " + analysis.dependence.inWords();
     text += analysis.inflated ? ", by which the covariance is widened\n" : "\n";

@@ -52,11 +52,13 @@ from ._gaussians import (
     ValidationReport,
     convert_covariance,
     fuse,
+    mean_about,
     propagate,
     random_directions,
     random_rotations,
     sample,
     tested_fuse,
+    unscented_transform,
     validate,
 )
 from ._motion import motion

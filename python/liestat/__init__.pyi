@@ -333,6 +333,7 @@ def mean(
     hexagonal_axes: Literal["a", "a*"] = "a",
     keepdims: bool = False,
     by: ArrayLike | None = None,
+    robust: Literal["huber", "median"] | None = None,
 ) -> MeanResult: ...
 class _Split(_SplitSummary):
     verdict: str
@@ -401,6 +402,10 @@ def convert_covariance(
     source: _ConventionWord = "body",
     threads: int = 1,
 ) -> _Array: ...
+def mean_about(x: _M, weights: ArrayLike, reference: _M) -> Gaussian: ...
+def unscented_transform(
+    function: Callable[[Any], Any], gaussian: Gaussian, c: float = 3.0
+) -> tuple[Any, _Array]: ...
 def propagate(
     function: Callable[..., Any],
     *inputs: Any,
@@ -438,7 +443,7 @@ class _MeanSummary:
     feature: str | _Several  # text; the type of the measurements
     # text; orientations of crystals: the proper point group that they are modulo; R and R k are equal
     symmetry: str | _Several
-    criterion: str | _Several  # text; lsq, wlsq, maha or barycentre
+    criterion: str | _Several  # text; lsq, wlsq, maha, barycentre, huber or median
     # text or null; frame of the measurements' covariances; null where it does not matter
     covariance_at: str | _Several | None
     likelihood: bool | _Several  # bool; whether the volume element is in the criterion
@@ -496,6 +501,12 @@ class _MeanSummary:
     # object or null; the farthest of these that was found, on a ring or in a valley; null without
     valley: dict[str, Any] | _Several | None
     valley_angle: float | _Several | None  # number or null; its angle from the mean; rad
+    # list of objects; of a robust mean: the median distance from the geodesic median over that of a normal law
+    scales: list[dict[str, Any]] | _Several
+    # list of objects; of a robust mean: measurements with a family-wise p below 0.05, the surest first
+    outliers: list[dict[str, Any]] | _Several
+    # number; of a robust mean: probability of outliers so much on one side if errors are symmetric
+    shift_p: float | _Several
     # number or null; χ² of the measurements under the noise that is stated for them; null: not tested
     fit: float | _Several | None
     fit_dof: float | _Several | None  # number or null; its degrees of freedom

@@ -460,6 +460,94 @@ def _tangent_of(value):
     return vector.size, lambda a, b: np.ravel(np.asarray(b, dtype=np.float64) - np.asarray(a, dtype=np.float64))
 
 
+def mean_about(x, weights, reference):
+    """The y near `reference` where the weighted residuals Σ w y.local(x) vanish, for weights of any sign.
+
+    Parameters
+    ----------
+    x : an array of features, shape (n,)
+    weights : array_like, shape (n,)
+        Their sum must not be zero; it is divided by.
+    reference : a single feature of that type
+
+    Returns
+    -------
+    Gaussian, with the weighted covariance Σ w z zᵀ / Σ w of the residuals, which has any sign.
+    """
+    x = require_manifold(x, "mean_about")
+    w = require_finite(as_numbers(weights, "mean_about: weights", ()), "mean_about: weights")
+    if x.ndim != 1 or w.shape != x.shape or len(w) == 0:
+        raise ValueError(f"mean_about: x, shape {x.shape}, and weights, shape {w.shape}: expected one list each")
+    size, total = np.abs(w).sum(), w.sum()
+    if not abs(total) > 1e-12 * size:
+        raise ValueError("mean_about: the weights add up to zero")
+    y, factor = reference, 1.0
+    step = w @ y.local(x) / total
+    tolerance = 8 * np.finfo(float).eps * (1 + np.abs(reference.params).max()) * size / abs(total)
+    for _ in range(100):
+        if not np.linalg.norm(step) > tolerance or factor < 1e-6:
+            break
+        there = y.retract(factor * step)
+        left = w @ there.local(x) / total
+        if np.linalg.norm(left) < np.linalg.norm(step):
+            y, step, factor = there, left, 1.0
+        else:
+            factor /= 2
+    if not np.linalg.norm(step) <= 100 * tolerance:
+        raise ArithmeticError("mean_about: no such feature was found near the reference")
+    z = y.local(x)
+    return Gaussian._of(y, (w / total * z.T) @ z)
+
+
+def unscented_transform(function, gaussian, c=3.0):
+    """The image of a Gaussian under a function by 2k + 1 sigma points; the mean is exact to third order.
+
+    Parameters
+    ----------
+    function : callable
+        Takes an array of features, returns an array of features or vectors of the same length.
+    gaussian : Gaussian
+        Of a single feature.
+    c : float
+        Sigma points are √c standard deviations from the mean, whose own weight 1 - k/c may be negative.
+
+    Returns
+    -------
+    image : Gaussian, or (mean, covariance) for vectors
+    cross : ndarray, shape (d, k)
+        Covariance of the image's error with that of the argument.
+    """
+    if not isinstance(gaussian, Gaussian) or not gaussian.mean.single:
+        raise ValueError("unscented_transform: expected the Gaussian of a single feature")
+    k = gaussian.mean.dof
+    if not c > 0:
+        raise ValueError(f"unscented_transform: c: expected a number above zero, got {c!r}")
+    try:
+        steps = math.sqrt(c) * np.linalg.cholesky(gaussian.covariance).T
+    except np.linalg.LinAlgError:
+        raise ValueError("unscented_transform: the covariance is not positive definite") from None
+    v = np.concatenate([np.zeros((1, k)), steps, -steps])
+    w = np.full(2 * k + 1, 0.5 / c)
+    w[0] = 1 - k / c
+    images = function(gaussian.mean.retract(v))
+    if isinstance(images, Manifold):
+        image = mean_about(images, w, images[0])
+        z, covariance = image.mean.local(images), image.covariance
+    else:
+        images = as_numbers(images, "unscented_transform: the function's result", ())
+        images = images.reshape(2 * k + 1, -1)
+        mean = w @ images
+        z = images - mean
+        covariance = (w * z.T) @ z
+        image = (mean, covariance)
+    if np.linalg.eigvalsh(covariance)[0] < -1e-9 * np.trace(np.abs(covariance)):
+        raise ArithmeticError(
+            "unscented_transform: the middle's negative weight leaves no covariance: the function bends too much within "
+            "the sigma points; a larger c has a smaller weight"
+        )
+    return image, (w * z.T) @ v
+
+
 def propagate(function, *inputs, jacobian=None, joint_covariance=None, step=6e-6):
     """The covariance of a function of uncertain features, to first order.
 

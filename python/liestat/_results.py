@@ -219,7 +219,12 @@ class MeanResult:
     law : Law
         The law of the squared Mahalanobis distance of the truth.
     criterion : str
-        'lsq', 'wlsq', 'maha' or 'barycentre'.
+        'lsq', 'wlsq', 'maha', 'barycentre', 'huber' or 'median'.
+    outliers, scales : list of dict
+        With `robust`: the features that the noise of the others does not explain, the surest first, and the scale of
+        the features along an axis in each part of the tangent vector.
+    shift_p : float
+        With `robust`: the probability of outliers so much on one side if errors are symmetric.
     n, iterations : int
     cells : int
         Of the global search; 0 where it was not needed.

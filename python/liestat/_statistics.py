@@ -113,6 +113,7 @@ def mean(
     hexagonal_axes="a",
     keepdims=False,
     by=None,
+    robust=None,
 ):
     """The mean of features, with its covariance and a certificate that it is the only one.
 
@@ -182,7 +183,12 @@ def mean(
         Leave the axes that are reduced in the result's shape, with length one.
     by : array_like, optional
         Labels of the features, of the shape of `x`: one mean for each of them, in the order of ``result.labels``, the
-        sorted labels. Indices in `farthest` count the features of a label. Not with `axis`.
+        sorted labels. Indices in `farthest` and `outliers` count the features of a label. Not with `axis`.
+    robust : {'huber', 'median'}, optional
+        Huber's mean or the geodesic median, which outliers do not break, in place of `criterion`: each part of the
+        metric, translation and rotation, by its own distance and scale (`scales`); SE2 and SE3 as frames. `outliers`
+        lists the features that the noise of the others does not explain, with family-wise p. A covariance needs 20
+        features whose outliers are not on one side: else it is withheld, with status 'inconsistent'.
 
     Returns
     -------
@@ -203,6 +209,16 @@ def mean(
     >>> result.mean.log().round(4)
     array([ 0.305,  0.03 , -0.11 ])
     """
+    if robust is not None:
+        if robust not in ("huber", "median"):
+            raise ValueError(f"mean: robust: expected 'huber' or 'median', got {robust!r}")
+        others = dict(weights=weights, covariances=covariances, factors=factors, deviations=deviations, times=times)
+        others.update(criterion=criterion, inflate=inflate or None, region=None if region == "law" else region)
+        named = [other for other, value in others.items() if value is not None]
+        if named:
+            raise ValueError(f"mean: robust={robust!r} takes no {', '.join(named)}")
+        if require_manifold(x, "mean")._core_name == "SE23":
+            raise ValueError("mean: robust: SE23 has no metric; the rotations, positions or velocities by themselves")
     if symmetry is not None and criterion is None:
         criterion = "lsq"
     if by is not None and (axis is not None or keepdims):
@@ -210,6 +226,8 @@ def mean(
     kind, criterion, groups, lead = _requests(
         "mean", x, weights, covariances, axis, criterion, covariance_at, likelihood, times, factors, deviations
     )
+    if robust is not None:
+        criterion, groups = robust, [dict(group, criterion=robust) for group in groups]
     if inflate and times is None:
         raise ValueError("mean: inflate needs times")
     if weights_are not in ("precision", "importance", "frequency"):
@@ -233,7 +251,7 @@ def mean(
     if symmetry is not None:
         if kind is not SO3:
             raise TypeError(f"mean: symmetry is that of rotations, SO3, not of {kind.__name__}")
-        if criterion not in (None, "lsq", "wlsq"):
+        if criterion not in (None, "lsq", "wlsq", "huber", "median"):
             raise ValueError(f"mean: symmetry: criterion 'lsq', got {criterion!r}")
         if hexagonal_axes not in ("a", "a*"):
             raise ValueError(f"mean: hexagonal_axes: expected 'a' or 'a*', got {hexagonal_axes!r}")

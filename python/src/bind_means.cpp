@@ -51,7 +51,8 @@ py::object pointGroup(const std::string& name, bool x_along_a) {
 }
 
 Criterion criterionOf(const std::string& text) {
-  for (const Criterion c : {Criterion::lsq, Criterion::wlsq, Criterion::maha, Criterion::barycentre}) {
+  for (const Criterion c :
+       {Criterion::lsq, Criterion::wlsq, Criterion::maha, Criterion::barycentre, Criterion::huber, Criterion::median}) {
     if (name(c) == text) return c;
   }
   throw py::value_error("no criterion " + text);

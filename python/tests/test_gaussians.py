@@ -15,6 +15,34 @@ def covariance(k, seed=0, scale=0.05, shape=()):
     return root @ np.swapaxes(root, -1, -2)
 
 
+class Unscented(unittest.TestCase):
+    def test_the_identity_keeps_the_gaussian(self):
+        # From four dimensions on the middle's weight is negative.
+        for name, k in support.TYPES.items():
+            for c in (1.0, 3.0, 8.0):
+                with self.subTest(name=name, c=c):
+                    g = Gaussian(support.features(name, 3)[1], covariance(k))
+                    image, cross = liestat.unscented_transform(lambda x: x, g, c)
+                    np.testing.assert_allclose(g.mean.local(image.mean), 0, atol=1e-11)
+                    np.testing.assert_allclose(image.covariance, g.covariance, atol=1e-12)
+                    np.testing.assert_allclose(cross, g.covariance, atol=1e-12)
+
+    def test_moments_of_a_square_are_exact(self):
+        g = Gaussian(liestat.R3([1.0, 2.0, -1.0]), covariance(3, scale=0.4))
+        (mean, _), _ = liestat.unscented_transform(lambda x: (x.params**2).sum(axis=1), g)
+        self.assertAlmostEqual(mean[0], 6 + np.trace(g.covariance), places=12)
+
+    def test_bad_input_is_said(self):
+        x = support.features("SO3", 3)
+        with self.assertRaisesRegex(ValueError, "add up to zero"):
+            liestat.mean_about(x, [1, -2, 1], x[0])
+        with self.assertRaisesRegex(ValueError, "one list each"):
+            liestat.mean_about(x, [1, 1], x[0])
+        with self.assertRaisesRegex(ArithmeticError, "negative weight"):
+            g = Gaussian(SE3.identity(), np.eye(6))
+            liestat.unscented_transform(lambda y: (y.local(SE3.identity()) ** 2).sum(axis=1), g, 0.5)
+
+
 class Conventions(unittest.TestCase):
     def test_known_matrices(self):
         x = support.features("SE3", 7)

@@ -17,6 +17,21 @@ import liestat
 from liestat import SE3, SO3, Frame3
 
 
+class Robust(unittest.TestCase):
+    def test_bad_arguments_are_said(self):
+        x = support.features("SE3", 30)
+        for arguments, message in (
+            (dict(robust="tukey"), "expected 'huber' or 'median'"),
+            (dict(robust="huber", weights=np.ones(30)), "takes no weights"),
+            (dict(robust="huber", criterion="lsq", times=np.arange(30)), "takes no times, criterion"),
+            (dict(robust="median", region="bootstrap"), "takes no region"),
+        ):
+            with self.subTest(message), self.assertRaisesRegex(ValueError, message):
+                liestat.mean(x, **arguments)
+        with self.assertRaisesRegex(ValueError, "SE23 has no metric"):
+            liestat.mean(support.features("SE23", 30), robust="huber")
+
+
 class Means(unittest.TestCase):
     def test_gradient_vanishes(self):
         """Σ log(mean, x) = 0 characterises the Fréchet mean of these types, and the barycentre of a group."""
