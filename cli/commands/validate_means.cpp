@@ -21,10 +21,9 @@ namespace {
 
 std::string verdictTable(const std::vector<VerdictRow>& verdicts) {
   std::string text =
-      "\nVerdicts of certifiedMean and of robust means, % of the trials: ok, of these outside of the 95 % region "
-      "(miss), on the wrong\n"
-      "side (wrong); coverage of what is ok (cover) and of first-order covariances never withheld (plain);\n"
-      "what is missing refutes the covariances that are stated\n";
+      "\nVerdicts of certifiedMean and of robust means, % of the trials: ok, of these outside of the\n"
+      "95 % region (miss), on the wrong side (wrong); coverage of what is ok (cover) and of first-order covariances\n"
+      "never withheld (plain); what is missing refutes the covariances that are stated\n";
   Table table({"feature, law", "n", "ok", "ambig", "ill", "miss", "wrong", "cover", "plain", ""});
   for (const VerdictRow& row : verdicts) {
     const auto percent = [&](double rate) { return fmt::format("{:.1f}", 100 * rate); };

@@ -1140,6 +1140,17 @@ class _TwoViewRival(Result):
     second_T_first: _RelativePose | None  # of the models with a pose
     curvature: str  # of the model on the scale of the noise: untested, small, widened or large
 
+class _TwoViewSuspectTest(Result):
+    name: str
+    unit: str  # of the estimate; empty: a ratio
+    estimate: float  # that the residuals ask for; null: the parameters explain all that it would do
+    standard_deviation: float  # of the estimate
+    z: float  # deviation from zero in standard deviations
+    p: float  # probability of a larger |z|
+    significant: bool  # whether
+    in_group: bool  # of the suspects that can't be told from the strongest
+    shift: float  # movement of the estimate per unit of the suspect, in standard deviations
+
 class _TwoViewModelRow(Result):
     model: str
     parents: list[str]  # more general models
@@ -1167,7 +1178,7 @@ class _TwoViewMotionEstimate(Result):
     size_from_matches: bool  # it is that of the matches' box
     repeated: int  # matches equal to another one, which counts for them
     contradicted: int  # matches that take no part, because they contradict each other
-    status: str  # ok, too_few, not_applicable, not_converged, ill_defined or contested
+    status: str  # ok, too_few, not_applicable, not_converged, ill_defined, contested or inconsistent
     reason: str | None  # in words, where status is not ok
     model: str  # the chosen one
     inliers: int  # their number
@@ -1181,6 +1192,7 @@ class _TwoViewMotionEstimate(Result):
     rivals: list[_TwoViewRival]  # where status is contested: the other models of which one may be right
     # where status is contested: those of the chosen model that all rivals have, with a covariance that covers each
     shared_parameters: _PhysicalParameters | None
+    suspects: list[_TwoViewSuspectTest]  # what the model takes for known of the cameras
     lattice: list[_TwoViewModelRow]  # all models
     inlier: _Array  # of each match
     squared_errors: _Array  # of each match, in units of the noise

@@ -234,7 +234,7 @@ class ConvertParity(ParityTest):
         with self.assertRaisesRegex(ValueError, "the file has no times"):
             self.write("never.tum", poses, format="tum")
         with self.assertRaisesRegex(ValueError, "format: expected one of"):
-            liestat.read_trajectory("x", format="bag")
+            liestat.read_trajectory("x", format="bagpipe")
         path = self.path("bad.tum")
         with open(path, "w", encoding="utf-8") as file:
             file.write("1 2 3 4 0 0 0 1\n2 1 2 3 0 0 0 2\n")

@@ -33,7 +33,7 @@ class PreintegrateParity(parity.ParityTest):
         if noise is not None:
             options = ("--noise", ",".join(map(repr, noise)), *options)
         json = parity.program("preintegrate", "--imu", imu, "--window", window, *options, codes=codes)
-        for name in ("format", "readings", "start_ns"):
+        for name in ("format", "readings", "start_ns", "reading_notes"):
             json.pop(name)
         t = self.readings[0]
         begin = t[0] + np.arange(int((t[-1] - t[0]) / window * (1 + 1e-12))) * window
