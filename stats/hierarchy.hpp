@@ -742,6 +742,7 @@ class Hierarchy {
     detail::keyedSample(measurements_, detail::mixBits(ending.own_sample), model.sampleSize(), sample,
                         [&](std::size_t i) { return of.errors[i] < limitOf(m, of.threshold, i); });
     std::vector<Measurement> sampled;
+    sampled.reserve(sample.size());
     for (const std::size_t i : sample) sampled.push_back(measurements_[i]);
     std::vector<Parameter> solutions;
     if (sample.size() == model.sampleSize()) model.solve(sampled, solutions);

@@ -387,16 +387,15 @@ MeanSummary summarizedMean(const E& executor, const MeanInput<M>& input, const M
     mean.status = mean.covariance_status = Status::not_applicable;
     return mean;
   }
-  if constexpr (std::is_same_v<M, CrystalOrientation>) {
+  constexpr bool is_crystal = std::is_same_v<M, CrystalOrientation>;
+  if constexpr (is_crystal) {
     if (!input.features.empty()) mean.symmetry = input.features.front().group().name();
   }
   if (isRobust(input.criterion)) {
     detail::setRobust(mean, input);
-  } else if constexpr (std::is_same_v<M, CrystalOrientation>) {
-    detail::setLeastSquares(mean, any, input, options);
-  } else if (input.criterion == Criterion::maha) {
-    detail::setMahalanobis(mean, any, input, options);
-  } else if constexpr (Metric<M>) {
+  } else if (!is_crystal && input.criterion == Criterion::maha) {
+    if constexpr (!is_crystal) detail::setMahalanobis(mean, any, input, options);
+  } else if constexpr (is_crystal || Metric<M>) {
     detail::setLeastSquares(mean, any, input, options);
   } else {
     detail::setBarycentre(mean, any, input, options);

@@ -66,7 +66,7 @@ SE3d transformAt(const BagEdge& edge, std::int64_t time, std::int64_t& gap) {
 
 void readChain(const std::string& file, const std::string& topic, const TrajectoryOptions& options, Trajectory& t) {
   const std::size_t colon = options.frames.find(':');
-  const auto bare = [](std::string frame) { return frame.starts_with('/') ? frame.substr(1) : frame; };
+  const auto bare = [](const std::string& frame) { return frame.starts_with('/') ? frame.substr(1) : frame; };
   const std::string to = bare(options.frames.substr(0, colon));
   const std::string from = colon == std::string::npos ? "" : bare(options.frames.substr(colon + 1));
   if (to.empty() || from.empty() || to == from) {

@@ -211,7 +211,8 @@ PartMatrix<K> averagedSlope(const RobustData& data, const TangentBlock& part, co
     }
     return gradient;
   });
-  const double all = static_cast<double>(data.n) / static_cast<double>((data.n + stride - 1) / stride);
+  const auto used = (data.n + stride - 1) / stride;
+  const double all = static_cast<double>(data.n) / static_cast<double>(used);
   return 0.5 * all * (slope + slope.transpose());
 }
 
