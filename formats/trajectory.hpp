@@ -74,18 +74,19 @@ constexpr auto words(DuplicateRule) { return std::array{"drop", "mean"}; }
 /// Options of readTrajectory.
 struct TrajectoryOptions {
   std::string format = "auto";  ///< one of trajectoryFormatNames(); `auto` looks at the first lines
-  std::string covariance_file;  ///< a side file of covariances; empty: the file's name with .cov after it, if it exists
-  bool side_file = true;        ///< false: no side file is looked for
+  std::string covariance_file =
+      {};                 ///< a side file of covariances; empty: the file's name with .cov after it, if it exists
+  bool side_file = true;  ///< false: no side file is looked for
   /// The layout of the numbers that follow TUM's eight, which no file says.
-  std::optional<CovarianceLayout> layout;
+  std::optional<CovarianceLayout> layout = {};
   double unmeasured = unmeasured_variance;  ///< see unmeasured_variance
   /// The unit of the stamps in formats that leave it open. Nothing: seconds, unless all of them lie beyond the year
   /// 5000 and are stamps since 1970 in ms, us or ns.
-  std::optional<StampUnit> time_unit;
+  std::optional<StampUnit> time_unit = {};
   /// Of a bag without a topic, or with the topic /tf: `map:base_link` takes the pose of base_link in map by the chain of
   /// transforms between the two.
-  std::string frames;
-  ReadingOptions reading;  ///< norms, CSV columns, size; its format is not used
+  std::string frames = {};
+  ReadingOptions reading = {};  ///< norms, CSV columns, size; its format is not used
 };
 
 /// The names of the formats, `auto` first. Some are only read: matrix, colmap, g2o and toro (their vertices), bag.

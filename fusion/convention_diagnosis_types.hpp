@@ -86,7 +86,7 @@ struct HypothesisFit {
 /// Scales of the blocks under which the errors are most likely: the file's covariance is D Σ D, D = diag(√k_t I, √k_r
 /// I).
 struct ScaleProfile {
-  Convention convention;
+  Convention convention = {};
   double translation = 1, rotation = 1;  ///< k_t, k_r: above one inflated, below overconfident
   double relative_sigma = 0;             ///< relative standard deviation of each
   bool identified = false;               ///< no other order and perturbation fits as well, scales free
