@@ -90,9 +90,9 @@ struct ScaleProfile {
   double translation = 1, rotation = 1;  ///< k_t, k_r: above one inflated, below overconfident
   double relative_sigma = 0;             ///< relative standard deviation of each
   bool identified = false;               ///< no other order and perturbation fits as well, scales free
-  std::vector<Convention> accepted;
+  std::vector<Convention> accepted = {};
   double log_likelihood = -detail::infinity;  ///< of the errors, absolute
-  WhitenedResidualTests tests;                ///< with the scales removed
+  WhitenedResidualTests tests = {};           ///< with the scales removed
   double generic_p = detail::not_a_number;    ///< likewise; see ConventionDiagnosis
   /// Each scale that is not right by its name: "rotation block: in degrees", …
   std::vector<std::string> words() const;
