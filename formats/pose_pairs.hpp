@@ -12,10 +12,10 @@ namespace liestat {
 
 /// Options of readPosePairs().
 struct PosePairOptions {
-  ReadingOptions reading;   ///< how both files are read
-  bool by_row = false;      ///< also where both files have times
-  double tolerance = 0.01;  ///< s, between times that belong together
-  std::size_t least = 3;    ///< pairs
+  ReadingOptions reading = {};  ///< how both files are read
+  bool by_row = false;          ///< also where both files have times
+  double tolerance = 0.01;      ///< s, between times that belong together
+  std::size_t least = 3;        ///< pairs
 };
 
 /// A row of each file.
