@@ -22,7 +22,7 @@ set(LIESTAT_COMPILED_SOURCES_trajectories
 set(LIESTAT_COMPILED_NEEDS_fusion random123)
 set(LIESTAT_COMPILED_NEEDS_trajectories boost random123)
 set(LIESTAT_COMPILED_NEEDS_formats boost fmt json yaml zlib)
-# What it uses if it is there: a definition LIESTAT_HAS_<NAME> tells its sources.
+# Packages that it uses if they are there: a definition LIESTAT_HAS_<NAME> tells its sources.
 set(LIESTAT_COMPILED_OPTIONAL_formats bz2 lz4 zstd sqlite_library)
 # Parts that a part links.
 set(LIESTAT_COMPILED_USES_fusion estimation)

@@ -78,7 +78,7 @@ class RunState {
   std::chrono::steady_clock::time_point written_;
   std::chrono::duration<double> pause_{1};  ///< between two times that the file is written
 };
-/// Of the process, which runs one command.
+/// The state of the process, which runs one command.
 inline RunState run_state;
 
 /// ProgramExecutor for trials: what has a result in run_state is not evaluated again, and of a part of a run nothing is

@@ -94,7 +94,7 @@ std::vector<TwoViewRuleRow> compareTwoViewRules(const TwoViewRuleComparison& com
                                       .matches = comparison.matches,
                                       .outliers = comparison.outliers,
                                       .sigma = comparison.sigma};
-    // Of each trial a bit for each rule that was right.
+    // A trial has a bit for each rule that was right.
     const auto trials = run.outcomes([&](std::uint64_t number) {
       const std::uint64_t seed = comparison.run.seed * 1000003 + number;
       const TwoViewScene scene(options, seed);

@@ -24,7 +24,7 @@ void describe(V& v, const BagTopic& t) {
   v("last", 1e-9 * static_cast<double>(t.last_ns), "likewise", "s");
 }
 
-/// What a bag has.
+/// The contents of a bag.
 struct BagContents {
   std::vector<BagTopic> topics;    ///< by their names
   std::vector<std::string> notes;  ///< sentences on what could not be read

@@ -83,7 +83,7 @@ struct TrajectoryOptions {
   /// The unit of the stamps in formats that leave it open. Nothing: seconds, unless all of them lie beyond the year
   /// 5000 and are stamps since 1970 in ms, us or ns.
   std::optional<StampUnit> time_unit = {};
-  /// Of a bag without a topic, or with the topic /tf: `map:base_link` takes the pose of base_link in map by the chain of
+  /// `map:base_link`, for a bag without a topic, or with the topic /tf, takes the pose of base_link in map by the chain of
   /// transforms between the two.
   std::string frames = {};
   ReadingOptions reading = {};  ///< norms, CSV columns, size; its format is not used

@@ -8,32 +8,18 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <string_view>
 
+#include <fuzz/checks.hpp>
 #include <formats/bag.hpp>
 #include <formats/imu.hpp>
-#include <formats/input_error.hpp>
 #include <formats/trajectory.hpp>
 
 namespace liestat {
 namespace {
-
-void require(bool condition) {
-  if (!condition) std::abort();
-}
-
-template <class Function>
-void mayRefuse(Function&& function) {
-  try {
-    function();
-  } catch (const InputError& error) {
-    require(std::string_view(error.what()).find('\n') == std::string_view::npos);
-  }
-}
 
 void check(const Trajectory& t) {
   require(t.size() > 0 && t.lines.size() == t.size() && t.times.size() == t.size());

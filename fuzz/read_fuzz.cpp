@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 
+#include <fuzz/checks.hpp>
 #include <formats/imu.hpp>
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
@@ -17,10 +18,6 @@
 
 namespace liestat {
 namespace {
-
-void require(bool condition) {
-  if (!condition) std::abort();
-}
 
 template <class List>
 bool isAbsentOrFull(const List& list, std::size_t n) {

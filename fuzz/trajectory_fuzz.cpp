@@ -10,26 +10,12 @@
 #include <string>
 #include <string_view>
 
-#include <formats/input_error.hpp>
+#include <fuzz/checks.hpp>
 #include <formats/pose_graph.hpp>
 #include <formats/trajectory.hpp>
 
 namespace liestat {
 namespace {
-
-void require(bool condition) {
-  if (!condition) std::abort();
-}
-
-/// Runs a function that may throw an InputError, whose message is one line.
-template <class Function>
-void mayRefuse(Function&& function) {
-  try {
-    function();
-  } catch (const InputError& error) {
-    require(std::string_view(error.what()).find('\n') == std::string_view::npos);
-  }
-}
 
 void check(const Trajectory& trajectory) {
   const std::size_t n = trajectory.size();

@@ -41,7 +41,7 @@ void SharedRun::declare(const Command& command) {
 void SharedRun::begin(const Invocation& invocation, const std::vector<std::string>& results) const {
   if (part.empty() != state.empty()) throw OptionError("--part", "is given together with --state");
   if (part.empty() && merge.empty() && checkpoint.empty()) return;
-  // What decides the numbers.
+  // The options that decide the numbers.
   std::string run = std::string(programVersion());
   for (const std::string& option : invocation.options) {
     const std::string name = option.substr(0, option.find('='));

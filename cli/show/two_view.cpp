@@ -136,7 +136,7 @@ std::string answer(const TwoViewMotionOutput& output) {
   }
   return text;
 }
-/// What is known of the cameras, as the matches see it.
+/// The cameras' focal lengths and distortions as the matches see them.
 TableRows suspectRows(const TwoViewMotionEstimate& estimate) {
   using Test = TwoViewSuspectTest;
   const auto told = [](const Test& x, double value) { return x.tested() ? std::optional(value) : std::nullopt; };

@@ -157,7 +157,7 @@ inline bool robustIterate(RobustData& data, const std::vector<PartLoss>& loss, i
   return false;
 }
 
-/// Of the data, for starts: so many at most, evenly.
+/// So many of the data at most, evenly, as starts.
 inline std::vector<Eigen::Index> someOf(std::size_t n, std::size_t most) {
   std::vector<Eigen::Index> some;
   const std::size_t m = std::min(n, most);

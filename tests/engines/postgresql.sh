@@ -32,18 +32,8 @@ run "create table t as select n, (n * 29 % 1440) / 16.0::float8 - 20 as deg,
   case n % 4 when 2 then 0.28 else 0 end::float8 z,
   case n % 4 when 0 then 0.8 when 3 then 0.936 else 0.96 end::float8 w from generate_series(0, 1999) n;
   create table shuffled as select * from t order by random(); analyze t; analyze shuffled;"
-failed=0
-# expect WHAT EXPECTED SQL: the output contains EXPECTED; = before it: it is that.
-expect() {
-  local output
-  output=$(run "$3")
-  case $2 in
-    =*) [ "$output" = "${2#=}" ] && return ;;
-    *) [[ $output == *"$2"* ]] && return ;;
-  esac
-  echo "postgresql.sh: $1: found '$output', expected '$2'" >&2
-  failed=1
-}
+# shellcheck source=tests/engines/expect.sh
+. "$(dirname "$0")/expect.sh"
 hex() { od -An -v -tx1 "$states/$1" | tr -d ' \n'; }
 
 expect "the library's bytes" "=$(hex engine_headings.state)" "select encode(heading_state(deg), 'hex') from t"

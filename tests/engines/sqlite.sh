@@ -15,18 +15,8 @@ create table t as with recursive i(n) as (select 0 union all select n + 1 from i
 $1
 SQL
 }
-failed=0
-# expect WHAT EXPECTED SQL: the output contains EXPECTED; = before it: it is that.
-expect() {
-  local output
-  output=$(run "$3")
-  case $2 in
-    =*) [ "$output" = "${2#=}" ] && return ;;
-    *) [[ $output == *"$2"* ]] && return ;;
-  esac
-  echo "sqlite.sh: $1: found '$output', expected '$2'" >&2
-  failed=1
-}
+# shellcheck source=tests/engines/expect.sh
+. "$(dirname "$0")/expect.sh"
 hex() { od -An -v -tx1 "$states/$1" | tr -d ' \n' | tr a-f A-F; }
 
 expect "the library's bytes" "=$(hex engine_headings.state)" "select hex(heading_state(deg)) from t;"

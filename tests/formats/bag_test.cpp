@@ -332,7 +332,7 @@ TEST(Bag, damagedBags) {
         damaged[i] = static_cast<char>(damaged[i] ^ (k % 2 ? 0xFF : 0x10));
       readAll(directory.write(fmt::format("{}{}", ++n, name), damaged));
     }
-    // Of half of a file something is read, with a note.
+    // Half of a file gives something, with a note.
     if (std::string(name).ends_with("db3.zstd") || std::string(name) == "unindexed.mcap") continue;
     EXPECT_GT(readAll(directory.write(name, whole.substr(0, whole.size() * 3 / 4))), 1U);
   }

@@ -100,7 +100,7 @@ TEST(Reading, Headings) {
   EXPECT_NE(errorIn("heading_deg,tx,ty,tz\n1,0,0,0\n").find("tx,ty,tz beside heading_deg"), std::string::npos);
   EXPECT_NE(errorIn("heading_deg,cov_00,cov_01\n1,1,0\n").find("column 'cov_01' in a file of headings"),
             std::string::npos);
-  // Of no use to a mean: see FeatureFile::unmeasured.
+  // Rows of no use to a mean: see FeatureFile::unmeasured.
   EXPECT_EQ(read("heading_deg,cov_00\n1,-1\n2,1\n").unmeasured, (std::vector<std::size_t>{0}));
 }
 

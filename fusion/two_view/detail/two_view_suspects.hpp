@@ -76,7 +76,7 @@ class TwoViewSuspects {
     for (int k = 0; k < suspects; ++k) {
       if (same_camera_ && k % 2 == 1) continue;
       TwoViewSuspectTest& test = tests.emplace_back();
-      // What is told no better than to its whole size is told by rounding alone.
+      // An estimate whose standard deviation is the whole quantity comes of rounding alone.
       if (found.suspects[static_cast<std::size_t>(k)].sigma < 1) {
         static_cast<SuspectTest&>(test) = found.suspects[static_cast<std::size_t>(k)];
         test.shift = found.shifts.col(k).norm();
