@@ -3,45 +3,14 @@
 #include <fusion/hand_eye.hpp>
 #include <stats/random.hpp>
 
+#include <support/allocations.hpp>
+
 #include <gtest/gtest.h>
 
-#include <malloc.h>
-
-#include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstddef>
-#include <cstdlib>
-#include <new>
 #include <utility>
 #include <vector>
-
-namespace {
-
-std::atomic<std::size_t> held = 0, most = 0;
-
-void* allocated(void* at) {
-  if (at == nullptr) throw std::bad_alloc();
-  const std::size_t now = held += malloc_usable_size(at);
-  most = std::max(most.load(), now);
-  return at;
-}
-void released(void* at) {
-  if (at != nullptr) held -= malloc_usable_size(at);
-  std::free(at);
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) { return allocated(std::malloc(size)); }
-void* operator new(std::size_t size, std::align_val_t to) {
-  const auto step = static_cast<std::size_t>(to);
-  return allocated(std::aligned_alloc(step, (size + step - 1) / step * step));
-}
-void operator delete(void* at) noexcept { released(at); }
-void operator delete(void* at, std::size_t) noexcept { released(at); }
-void operator delete(void* at, std::align_val_t) noexcept { released(at); }
-void operator delete(void* at, std::size_t, std::align_val_t) noexcept { released(at); }
 
 namespace {
 
@@ -50,10 +19,10 @@ using namespace liestat;
 /// Bytes that a call holds at most beyond what is held before it.
 template <class Call>
 double bytesOf(const Call& call) {
-  const std::size_t before = held;
-  most = before;
+  const std::size_t before = tests::bytes_held;
+  tests::most_bytes_held = before;
   call();
-  return static_cast<double>(most - before);
+  return static_cast<double>(tests::most_bytes_held - before);
 }
 
 SE3d poseAt(double t) {

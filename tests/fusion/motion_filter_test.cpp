@@ -7,27 +7,13 @@
 #include <fusion/motion/search.hpp>
 #include <fusion/motion/subspace_filter.hpp>
 #include <fusion/motion/track_pairs.hpp>
+#include <support/allocations.hpp>
 #include <support/motion_runs.hpp>
 
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
-#include <new>
 #include <vector>
-
-// Allocations of this program, for the promise that an update makes none.
-namespace {
-std::atomic<std::size_t> allocations{0};
-}
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  std::abort();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace {
 

@@ -8,31 +8,16 @@
 
 #include <lie/lie.hpp>
 
+#include <support/allocations.hpp>
 #include <support/turned_s2.hpp>
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <cstddef>
 #include <cstdint>
-#include <new>
 #include <vector>
-
-namespace {
-/// Calls of operator new in this program.
-std::size_t allocations = 0;
-}  // namespace
-
-// Not inlined, for g++ takes malloc and free for a pair that does not belong to new and delete.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace {
 
@@ -213,14 +198,14 @@ TYPED_TEST(RecursiveMeanTest, RefusesWhatIsNoFeature) {
 TYPED_TEST(RecursiveMeanTest, NeverAllocates) {
   using M = TypeParam;
   const auto features = cloud<M>(20, 0.3);
-  const std::size_t before = allocations;
+  const std::size_t before = tests::allocations;
   RecursiveMean<M> stream({.forgetting = 0.99});
   ScalarOf<M> trace(0);
   for (const M& x : features) {
     stream.add(x);
     if (stream.n() > 1) trace += stream.covarianceFromResiduals().trace();
   }
-  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(tests::allocations, before);
   EXPECT_GT(trace, ScalarOf<M>(0));
 }
 

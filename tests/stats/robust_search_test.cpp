@@ -3,6 +3,7 @@
 #include <stats/robust_search.hpp>
 
 #include <stats/measurement_error.hpp>
+#include <support/allocations.hpp>
 #include <support/constrained_models.hpp>
 #include <support/sanitized.hpp>
 
@@ -11,27 +12,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstddef>
-#include <cstdlib>
 #include <limits>
-#include <new>
 #include <optional>
 #include <span>
 #include <vector>
-
-// Allocations of this program, for the promise that iterate() makes none.
-namespace {
-std::atomic<std::size_t> allocations{0};
-}
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  std::abort();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace {
 
@@ -395,9 +381,9 @@ template <class Model, class Rule>
 void allocatesNothing(const Rule& rule) {
   const auto model = lineScene<Model>(100, 100, 1);
   RobustSearch search(model, rule);
-  const std::size_t before = allocations;
+  const std::size_t before = liestat::tests::allocations;
   for (int k = 0; k < 200; ++k) search.iterate();
-  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(liestat::tests::allocations, before);
 }
 
 TEST(RobustSearch, IterateAllocatesNothing) {
