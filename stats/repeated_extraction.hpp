@@ -37,6 +37,8 @@ struct ExtractedStructure {
   std::string name;
   /// When it was found, over the measurements that were left then: errors and inliers are those of that search.
   ModelState<Parameter> state;
+  /// Of that search: the models that its measurements did not tell from this one (Hierarchy::contested).
+  std::vector<std::pair<std::size_t, ModelState<Parameter>>> rivals = {};
   ModelEstimate<Parameter> estimate;  ///< from its own inliers
   std::vector<std::size_t> inliers;   ///< places in the caller's order, ascending
 };
@@ -93,7 +95,10 @@ class RepeatedExtraction {
     const auto& state = search_->state(m);
     if (!state.hasEstimate() || state.unsupported) return false;
     const std::size_t before = structures_.size();
-    structures_.push_back({m, models_[m]->name(), state, state.estimate, {}});
+    structures_.push_back({m, models_[m]->name(), state, {}, state.estimate, {}});
+    for (const std::size_t rival : search_->contested()) {
+      if (rival != m) structures_.back().rivals.emplace_back(rival, search_->state(rival));
+    }
     assign(options_.rounds == 0);
     for (int round = 0; round < options_.rounds; ++round) {
       estimateAgain();

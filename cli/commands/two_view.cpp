@@ -123,6 +123,14 @@ void addTwoViewCommand(const CommandList& program) {
   command.flag("--planes", options->estimate.planes_only, "Homographies alone: with --motions the planes of a scene");
   command.flag("--noise-is-known", options->estimate.noise_is_known,
                "--sigma is right (default: noise may be larger, and the matches say by how much)");
+  command
+      .option("--focal-sigma", options->estimate.focal_length_sigma,
+              "Standard deviation of the focal lengths, relative; the covariances then contain it (default 0: known)")
+      .range(0.0, 0.5);
+  command
+      .option("--k1-sigma", options->estimate.k1_sigma,
+              "Standard deviation of the distortion k1, likewise (default 0: known)")
+      .range(0.0, 0.5);
   command.flag("--keep-contradictions", options->estimate.keep_contradictions,
                "Use matches that contradict each other (one point matched with two), too");
   command.option("--seed", options->estimate.search.seed, "Seed of the draws (default 1)");

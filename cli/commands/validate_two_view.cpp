@@ -1,5 +1,6 @@
 #include <report/table.hpp>
 #include <cli/show/validations.hpp>
+#include <experiments/two_view_answers.hpp>
 #include <experiments/two_view_validation.hpp>
 #include <experiments/two_view_rules.hpp>
 #include <experiments/two_view_pairs.hpp>
@@ -129,6 +130,33 @@ ValidationView viewOf(const std::vector<TwoViewRuleRow>& rows) {
   return view;
 }
 
+std::string share(std::size_t count, std::size_t of) {
+  return of == 0 ? "" : fmt::format("{:.1f}", 100 * static_cast<double>(count) / static_cast<double>(of));
+}
+using AnswerRow = TwoViewAnswerRow;
+const Columns<AnswerRow> answer_columns{
+    {"scene", &AnswerRow::scene},
+    {"right %", [](const AnswerRow& row) { return share(row.right, row.trials); }},
+    {"marked %", [](const AnswerRow& row) { return share(row.marked, row.trials); }},
+    {"wrong %", [](const AnswerRow& row) { return share(row.wrong, row.trials); }},
+    {"promised", [](const AnswerRow& row) { return fmt::format("{:.0f}", 100 * row.max_wrong); }},
+    {"contested %", [](const AnswerRow& row) { return share(row.contested, row.trials); }},
+    {"in set %", [](const AnswerRow& row) { return share(row.right_in_set, row.contested); }},
+    {"poses", &AnswerRow::poses},
+    {"outside %", [](const AnswerRow& row) { return share(row.outside, row.poses); }},
+    {"verdict", [](const AnswerRow& row) { return verdictCell(row.passed); }}};
+
+ValidationView viewOf(const std::vector<AnswerRow>& rows) {
+  return {.title = "Two-view motion: are wrong answers marked?",
+          .introduction =
+              "Each trial moves a camera by one motion and asks for it as a user does. right: ok, and the right model; "
+              "wrong: ok, and another one; marked: not ok. in set: of the contested answers those whose set has the "
+              "right model. outside: of the right poses those with the truth beyond the region of 95 %.",
+          .judgement = judgementOf(rows),
+          .fields = [&rows](JsonObject& object) { object("answers", rows); },
+          .tables = {{.title = "Answers", .table = tablesOf(answer_columns, rows), .page_title = "Answers"}}};
+}
+
 std::string shortName(const std::string& model) {
   if (model == "retinal translation") return "rtrans";
   if (model == "retinal displacement") return "rdisp";
@@ -227,7 +255,7 @@ struct Options {
   TwoViewValidation validation;
   std::vector<std::string> motions;
   std::optional<double> sigma;
-  bool rules = false;
+  bool rules = false, answers = false;
   std::string pairs;
   bool all_matches = false;
   RunOptions run;
@@ -244,6 +272,14 @@ int runPairs(const Options& options, const Invocation& invocation) {
   return publish(options.run, invocation, cli::viewOf(result));
 }
 
+int judgeAnswers(const Options& options, const Invocation& invocation) {
+  TwoViewAnswers answers{
+      .run = options.run.size(20, 500), .matches = options.validation.matches, .outliers = options.validation.outliers};
+  answers.sigma = options.sigma.value_or(answers.sigma);
+  const auto rows = runTrials(bar, [&](const auto& progress) { return validateTwoViewAnswers(answers, progress); });
+  return publish(options.run, invocation, viewOf(rows));
+}
+
 int compareRules(const Options& options, const Invocation& invocation) {
   TwoViewRuleComparison comparison{
       .run = options.run.size(20, 500), .matches = options.validation.matches, .outliers = options.validation.outliers};
@@ -256,6 +292,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   options.run.begin(invocation);
   if (!options.pairs.empty()) return runPairs(options, invocation);
   if (options.rules) return compareRules(options, invocation);
+  if (options.answers) return judgeAnswers(options, invocation);
   TwoViewValidation validation = options.validation;
   validation.sigma = options.sigma.value_or(validation.sigma);
   if (options.run.full || !options.motions.empty()) validation.motions = chosen(all_two_view_motions, options.motions);
@@ -299,6 +336,11 @@ void addValidateTwoViewCommand(const CommandList& validate) {
            "Compare rules by which the model may be chosen instead; all models are estimated")
       .excludes("--pairs")
       .excludes("--motion");
+  app.flag("--answers", options->answers,
+           "Judge the answers of `liestat two-view` instead: their statuses, also where baselines come near the noise")
+      .excludes("--pairs")
+      .excludes("--motion")
+      .excludes("--rules");
   options->run.declare(app, "50, with --full 500, of real pairs 10");
   app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }

@@ -289,7 +289,8 @@ TableRows structureRows(const TwoViewMotions& motions) {
   return tableOf<TwoViewStructure>({{"motion", [&](const TwoViewStructure& s) { return &s - all.data() + 1; }},
                                     {"model", &TwoViewStructure::model},
                                     {"matches", [](const TwoViewStructure& s) { return s.inliers.size(); }},
-                                    {"rms px", &TwoViewStructure::rms, 3}},
+                                    {"rms px", &TwoViewStructure::rms, 3},
+                                    {"status", [](const TwoViewStructure& s) { return name(s.status); }}},
                                    all);
 }
 std::string endOf(const TwoViewMotionsOutput& output) {

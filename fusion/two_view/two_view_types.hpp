@@ -95,10 +95,25 @@ struct TwoViewSuspectTest : SuspectTest {
   /// The movement of the estimate per unit of the suspect, in its standard deviations (a Mahalanobis distance); NaN if
   /// the suspect is not tested.
   double shift = std::numeric_limits<double>::quiet_NaN();
+  double prior_sigma = 0;  ///< as in the options: 0 where it is taken for known
+};
+
+/// What else may be true of a motion.
+struct TwoViewAlternatives {
+  /// Where the status is contested: the other models of the set of which one is right, or the second motion.
+  std::vector<TwoViewRival> rivals;
+  /// The parameters that the chosen model shares with all rivals, at the chosen one's values. Their covariance is the
+  /// mean over the set of the models' own covariances and the squares of their differences from these values, so that
+  /// it covers each of them; what only one model has is listed with that model.
+  std::optional<PhysicalParameters> shared;
+  /// The focal length and the radial distortion k1 (of the lens model; where that has none, of u (1 + k1 |u|²)) that the
+  /// model takes for known, each tested; a set for each camera where there are two. Focal lengths only where cameras
+  /// are given.
+  std::vector<TwoViewSuspectTest> suspects;
 };
 
 /// The motion between two images.
-struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
+struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame, TwoViewAlternatives {
   /// ok; too_few: no finite match; not_applicable: noise or size are not positive; not_converged: stopped, or the
   /// estimate of the chosen model did not end; ill_defined: the chosen model's inliers could be chance, or all matches
   /// are the same one, or its model is curved on the scale of the noise (no covariance); contested: the matches do not
@@ -112,16 +127,6 @@ struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
   std::vector<double> errors;  ///< squared, in units of the noise; NaN of matches that are not finite
   std::size_t inliers = 0;
   double threshold = 0;  ///< threshold of the chosen model, on squared errors
-  /// Where the status is contested: the other models of the set of which one is right, or the second motion.
-  std::vector<TwoViewRival> rivals;
-  /// The parameters that the chosen model shares with all rivals, at the chosen one's values. Their covariance is the
-  /// mean over the set of the models' own covariances and the squares of their differences from these values, so that
-  /// it covers each of them; what only one model has is listed with that model.
-  std::optional<PhysicalParameters> shared;
-  /// The focal length and the radial distortion k1 (of the lens model; where that has none, of u (1 + k1 |u|²)) that the
-  /// model takes for known, each tested; a set for each camera where there are two. Focal lengths only where cameras
-  /// are given.
-  std::vector<TwoViewSuspectTest> suspects;
 
   bool ok() const { return status == Status::ok; }
   const TwoViewModelRow& chosenModel() const { return lattice[chosen]; }
@@ -134,21 +139,24 @@ struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
 };
 
 /// One of several motions in the same images: of an object, or of a plane of the scene.
-struct TwoViewStructure : TwoViewMotionResult {
+struct TwoViewStructure : TwoViewMotionResult, TwoViewAlternatives {
   std::string model;
-  Status status = Status::ok;        ///< status of the estimate from its own inliers
+  /// Of the estimate from its own inliers; contested and inconsistent as TwoViewMotionEstimate's.
+  Status status = Status::ok;
+  std::string reason;                ///< in words, unless ok
   std::vector<std::size_t> inliers;  ///< places of its matches, ascending
   double rms = 0;                    ///< σ sqrt(χ²/r) of these, px
 };
 
 /// Several motions, in the order in which they were found.
 struct TwoViewMotions : TwoViewImageFrame {
-  Status status = Status::too_few;  ///< as TwoViewMotionEstimate's; ok without a structure, too
+  /// As TwoViewMotionEstimate's, and not ok if that of one structure is not; ok without a structure.
+  Status status = Status::too_few;
   std::string reason;
   std::vector<TwoViewStructure> structures;
   std::vector<std::size_t> rest;  ///< matches that belong to none
 
-  /// There is a motion that chance does not explain, and the search came to its end.
+  /// There is a motion that chance does not explain, the search came to its end, and all motions are ok.
   bool ok() const { return status == Status::ok && !structures.empty(); }
   /// Verdict on the motions: to be trusted if ok(), else not.
   Verdict verdict() const;
@@ -228,6 +236,15 @@ template <class V>
 void describe(V& v, const TwoViewSuspectTest& x) {
   describe(v, static_cast<const SuspectTest&>(x));
   v("shift", x.shift, "movement of the estimate per unit of the suspect, in standard deviations");
+  v("prior_standard_deviation", x.prior_sigma, "0: taken for known");
+}
+
+template <class V>
+void describe(V& v, const TwoViewAlternatives& x) {
+  v("rivals", x.rivals, "where status is contested: the other models of which one may be right");
+  v("shared_parameters", x.shared,
+    "where status is contested: those of the chosen model that all rivals have, with a covariance that covers each");
+  v("suspects", x.suspects, "what the model takes for known of the cameras");
 }
 
 template <class V>
@@ -238,10 +255,7 @@ void describe(V& v, const TwoViewMotionEstimate& x) {
   v("model", x.lattice.empty() ? std::string() : x.chosenModel().name, "the chosen one");
   v("inliers", x.inliers, "their number");
   describe(v, static_cast<const TwoViewMotionResult&>(x));
-  v("rivals", x.rivals, "where status is contested: the other models of which one may be right");
-  v("shared_parameters", x.shared,
-    "where status is contested: those of the chosen model that all rivals have, with a covariance that covers each");
-  v("suspects", x.suspects, "what the model takes for known of the cameras");
+  describe(v, static_cast<const TwoViewAlternatives&>(x));
   v("lattice", x.lattice, "all models")("inlier", x.inlier, "of each match");
   v("squared_errors", x.errors, "of each match, in units of the noise");
 }
@@ -255,8 +269,10 @@ void describeSeries(V& v, const TwoViewMotionEstimate& x) {
 template <class V>
 void describe(V& v, const TwoViewStructure& x) {
   v("model", x.model)("status", name(x.status), "of the estimate from its own inliers");
+  v("reason", x.reason.empty() ? std::nullopt : std::optional(x.reason), "in words, where status is not ok");
   v("inliers", x.inliers.size(), "their number")("rms", x.rms, "noise that its inliers show", "px");
   describe(v, static_cast<const TwoViewMotionResult&>(x));
+  describe(v, static_cast<const TwoViewAlternatives&>(x));
 }
 
 template <class V>

@@ -1446,6 +1446,8 @@ def two_view(
     *,
     image_size: Sequence[float] | None = None,
     noise_is_known: bool = False,
+    focal_sigma: float = 0.0,
+    k1_sigma: float = 0.0,
     seed: int = 1,
 ) -> TwoViewResult: ...
 def robust_two_view(

@@ -404,7 +404,16 @@ _TWO_VIEW_NAMES = {"physical": "parameters", "errors": "squared_errors", "name":
 
 
 def two_view(
-    matches, sigma=1.0, camera=None, second_camera=None, *, image_size=None, noise_is_known=False, seed=1
+    matches,
+    sigma=1.0,
+    camera=None,
+    second_camera=None,
+    *,
+    image_size=None,
+    noise_is_known=False,
+    focal_sigma=0.0,
+    k1_sigma=0.0,
+    seed=1,
 ):
     """The motion between two images from matches of which some are wrong, its model chosen from several.
 
@@ -419,6 +428,8 @@ def two_view(
     image_size : (width, height), optional
     noise_is_known : bool
         `sigma` is exact: the noise that the matches show does not replace it, and shorter baselines are told.
+    focal_sigma, k1_sigma : float
+        Standard deviations of the focal lengths, relative, and of the distortion k1; the covariances contain them.
     seed : int
 
     Returns
@@ -444,6 +455,8 @@ def two_view(
         nothing if second_camera is None else second_camera._list(),
         size,
         bool(noise_is_known),
+        float(focal_sigma),
+        float(k1_sigma),
         int(seed),
     )
     if d["status"] != "ok":

@@ -44,9 +44,11 @@ py::dict poseOf(const Gaussian<Essentiald>& pose) {
 }
 
 py::dict twoView(const DoubleArray& matches, double sigma, const DoubleArray& first, const DoubleArray& second,
-                 const DoubleArray& image_size, bool noise_is_known, std::uint64_t seed) {
+                 const DoubleArray& image_size, bool noise_is_known, double focal_sigma, double k1_sigma,
+                 std::uint64_t seed) {
   TwoViewMotionOptions options;
   options.noise_is_known = noise_is_known;
+  options.focal_length_sigma = focal_sigma, options.k1_sigma = k1_sigma;
   options.sigma = sigma;
   options.first = optionalCamera(first);
   options.second = optionalCamera(second);

@@ -13,6 +13,7 @@
 #include <experiments/robust_validation.hpp>
 #include <experiments/table1.hpp>
 #include <experiments/two_solutions.hpp>
+#include <experiments/two_view_answers.hpp>
 #include <experiments/two_view_pairs.hpp>
 #include <experiments/two_view_rules.hpp>
 #include <experiments/two_view_validation.hpp>
@@ -114,6 +115,12 @@ const std::vector<Subject>& subjects() {
        {},
        80,
        false},
+      {"two-view --answers --trials 2",
+       {{"answers", fields<TwoViewAnswerRow>()}},
+       "",
+       "two-view --answers --trials 100000",
+       {"--answers --rules"},
+       110},
       {"vi-init --trials 20 --check consistency,rest,drift --window 1,2",
        {{"rows", fields<ViInitRow>()}},
        "vi-init --trials 40 --check closed_form --window 2 --noise 3",

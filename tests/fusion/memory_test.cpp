@@ -29,7 +29,7 @@ SE3d poseAt(double t) {
   return SE3d(SO3d::rotZ(0.4 * t) * SO3d::rotX(0.8 * std::sin(t)),
               Eigen::Vector3d(3 * std::cos(t), 3 * std::sin(t), 0.1 * t));
 }
-constexpr std::size_t n = 20000;
+constexpr std::size_t n = 5000;
 
 // Poses of both sensors are 112 bytes a pair, the stream 64, times 8, the fits of the pairs 64. What is kept of each
 // row is far from what the rows have, 880 bytes.

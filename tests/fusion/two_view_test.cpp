@@ -790,6 +790,58 @@ TEST(TwoViewSuspects, EachCameraHasItsOwn) {
   EXPECT_TRUE(none.suspects[1].tested());
 }
 
+// Cameras whose focal lengths and distortions are known with a standard deviation that is stated. Where they are taken
+// for known, the squared errors of these poses are some tens of times what the covariances claim.
+TEST(TwoViewPriors, CovariancesContainThem) {
+  constexpr double focal_sigma = 0.02, k1_sigma = 0.02;
+  double widened = 0, known = 0;
+  int poses = 0, quiet = 0;
+  constexpr int trials = 40;
+  for (std::uint64_t seed = 1; seed <= trials; ++seed) {
+    const TwoViewScene scene({.motion = TwoViewMotion::essential}, 94000 + seed);
+    CounterRng rng(94000 + seed);
+    const double k1 = k1_sigma * rng.normal(), factor = 1 + focal_sigma * rng.normal();
+    TwoViewMotionOptions options = optionsOf(scene);
+    options.first = cameraOf(scene.options, scene.options.focal_length / factor);
+    options.focal_length_sigma = focal_sigma, options.k1_sigma = k1_sigma;
+    const std::vector<Eigen::Vector4d> pixels = throughLens(scene, k1);
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(pixels, options);
+    quiet += found.suspects.empty() || (!found.suspects[0].significant && !found.suspects[1].significant);
+    if (!found.ok() || !found.relative_pose) continue;
+    options.focal_length_sigma = options.k1_sigma = 0;
+    const TwoViewMotionEstimate as_known = estimateTwoViewMotion(pixels, options);
+    if (!as_known.relative_pose || !as_known.relative_pose->covariance.allFinite()) continue;
+    const Essentiald truth(SO3d::fitToSO3(scene.R), scene.t);
+    widened += mahalanobisSquared(*found.relative_pose, truth);
+    known += mahalanobisSquared(*as_known.relative_pose, truth);
+    ++poses;
+    // The matrix of pixels does not depend on the focal length alone: it is widened less than the pose.
+    EXPECT_GT(found.matrix_covariance.trace(), as_known.matrix_covariance.trace());
+  }
+  EXPECT_GE(quiet, trials - 2);
+  ASSERT_GE(poses, 20);
+  EXPECT_NEAR(widened / (5 * poses), 1, 4 * std::sqrt(2.0 / (5 * poses)));
+  EXPECT_GT(known / widened, 10);
+}
+
+TEST(TwoViewPriors, AreTested) {
+  const TwoViewScene scene({.motion = TwoViewMotion::rotation}, 95002);
+  TwoViewMotionOptions options = optionsOf(scene);
+  options.first = cameraOf(scene.options, scene.options.focal_length / 1.03);
+  options.focal_length_sigma = 0.003;
+  const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, options);
+  EXPECT_EQ(found.status, Status::inconsistent);
+  EXPECT_NE(found.reason.find("% against its prior"), std::string::npos) << found.reason;
+  EXPECT_EQ(found.suspects.at(0).prior_sigma, 0.003);
+  // What it allows is not refuted.
+  options.focal_length_sigma = 0.03;
+  EXPECT_TRUE(estimateTwoViewMotion(scene.pixels, options).ok());
+  options.focal_length_sigma = -1;
+  EXPECT_EQ(estimateTwoViewMotion(scene.pixels, options).status, Status::not_applicable);
+  options.focal_length_sigma = 0.01, options.first = std::nullopt;
+  EXPECT_EQ(estimateTwoViewMotion(scene.pixels, options).status, Status::not_applicable);
+}
+
 // Two objects, or an object and the scene: the answer names both, with their shares.
 TEST(TwoViewMotionEstimate, TwoRigidMotionsAreContested) {
   int named = 0;

@@ -15,6 +15,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -28,24 +29,30 @@
 namespace liestat {
 namespace detail {
 
+/// The derivatives of the entries of M by a pose, and with six parameters by log f: M ~ D [t]× R D,
+/// D = diag(1/f, 1/f, 1).
+inline Eigen::MatrixXd entriesByPose(const ModelEstimate<TwoViewMotionModel>& estimate, Eigen::Matrix3d& M) {
+  const bool with_focal_length = estimate.covariance.rows() == 6;
+  const double f = with_focal_length ? estimate.parameter.focal_length : 1;
+  const Eigen::Matrix3d D = Eigen::Vector3d(1 / f, 1 / f, 1).asDiagonal();
+  const Eigen::Matrix3d flat = Eigen::Vector3d(1, 1, 0).asDiagonal();
+  const Eigen::Matrix<double, 9, 5> by_pose = estimate.parameter.pose.essentialMatrixJacobian();
+  M = D * estimate.parameter.pose.essentialMatrix() * D;
+  Eigen::MatrixXd J(9, estimate.covariance.rows());
+  for (int k = 0; k < 5; ++k) J.col(k) = entriesFrom(D * matrixFrom(Entries(by_pose.col(k))) * D);
+  if (with_focal_length) J.col(5) = entriesFrom(-(flat * M + M * flat));
+  return J;
+}
+inline bool isOfPose(const ModelEstimate<TwoViewMotionModel>& estimate) {
+  return estimate.covariance.rows() == 5 || estimate.covariance.rows() == 6;
+}
+
 /// The covariance of A M B/‖A M B‖, entries column after column.
 inline Eigen::MatrixXd covarianceInPixels(const ModelEstimate<TwoViewMotionModel>& estimate, const Eigen::Matrix3d& A,
                                           const Eigen::Matrix3d& B) {
   Eigen::MatrixXd covariance = estimate.covariance;
   Eigen::Matrix3d M = estimate.parameter.matrix;
-  if (covariance.rows() == 5 || covariance.rows() == 6) {
-    // A pose, and with six log f: M ~ D [t]× R D, D = diag(1/f, 1/f, 1).
-    const bool with_focal_length = covariance.rows() == 6;
-    const double f = with_focal_length ? estimate.parameter.focal_length : 1;
-    const Eigen::Matrix3d D = Eigen::Vector3d(1 / f, 1 / f, 1).asDiagonal();
-    const Eigen::Matrix3d flat = Eigen::Vector3d(1, 1, 0).asDiagonal();
-    const Eigen::Matrix<double, 9, 5> by_pose = estimate.parameter.pose.essentialMatrixJacobian();
-    M = D * estimate.parameter.pose.essentialMatrix() * D;
-    Eigen::MatrixXd J(9, covariance.rows());
-    for (int k = 0; k < 5; ++k) J.col(k) = entriesFrom(D * matrixFrom(Entries(by_pose.col(k))) * D);
-    if (with_focal_length) J.col(5) = entriesFrom(-(flat * M + M * flat));
-    covariance = covarianceThrough(J, covariance);
-  }
+  if (isOfPose(estimate)) covariance = covarianceThrough(entriesByPose(estimate, M), covariance);
   if (covariance.rows() != 9) return {};
   M = A * M * B;
   const Entries unit = entriesFrom(M / M.norm());
@@ -55,6 +62,29 @@ inline Eigen::MatrixXd covarianceInPixels(const ModelEstimate<TwoViewMotionModel
     J.col(k) = moved - unit.dot(moved) * unit;
   }
   return covarianceThrough(J, covariance);
+}
+
+/// The covariance of an estimate with those shifts of its matrix, of norm one, in it.
+inline Eigen::MatrixXd covarianceWithShifts(const ModelEstimate<TwoViewMotionModel>& estimate,
+                                            std::span<const TwoViewCameraTests::Shift> shifts) {
+  Eigen::MatrixXd covariance = estimate.covariance;
+  if (shifts.empty()) return covariance;
+  Eigen::Matrix3d M = estimate.parameter.matrix;
+  Eigen::MatrixXd to_parameters;
+  if (isOfPose(estimate)) {
+    const Eigen::MatrixXd J = entriesByPose(estimate, M);
+    // Along M itself nothing moves.
+    const Entries unit = entriesFrom(M / M.norm());
+    const Eigen::MatrixXd across = (J - unit * (unit.transpose() * J)) / M.norm();
+    to_parameters = (across.transpose() * across).ldlt().solve(across.transpose());
+  } else {
+    to_parameters = M.norm() * Eigen::MatrixXd::Identity(9, 9);
+  }
+  for (const TwoViewCameraTests::Shift& shift : shifts) {
+    const Eigen::VectorXd moved = to_parameters * shift.entries;
+    covariance += moved * moved.transpose();
+  }
+  return covariance;
 }
 
 inline TwoViewModelRow rowOf(const Hierarchy<Eigen::Vector4d, TwoViewMotionModel>& search, std::size_t m,
@@ -259,6 +289,17 @@ struct CoordinateRange {
   }
 };
 
+/// The cameras for which the matches speak instead of those as given, or as the priors allow; empty: none.
+inline std::string refutedCameras(std::span<const TwoViewSuspectTest> tests) {
+  std::string refuted = suspectsInWords(tests);
+  for (const TwoViewSuspectTest& test : tests) {
+    if (test.prior_sigma > 0 && test.significant) {
+      refuted += (refuted.empty() ? "" : ", ") + test.inWords() + " against its prior";
+    }
+  }
+  return refuted;
+}
+
 /// Matches as the models take them.
 struct TwoViewInput {
   TwoViewImageFrame frame;
@@ -269,6 +310,7 @@ struct TwoViewInput {
   bool same_camera = true;
   TwoViewCalibration calibration = TwoViewCalibration::uncalibrated;
   TwoViewModels models;
+  std::array<double, 2> prior_sigmas = {};  ///< of focal lengths and k1
   std::vector<Eigen::Vector4d> normalised;
   std::vector<std::size_t> used;            ///< places of those that take part
   std::vector<std::size_t> first_of_equal;  ///< for each match the place of the first one that is equal to it
@@ -277,6 +319,7 @@ struct TwoViewInput {
     frame.matches = matches.size(), frame.sigma = options.sigma;
     frame.calibrated = options.first.has_value();
     same_camera = !options.second;
+    prior_sigmas = {options.focal_length_sigma, options.k1_sigma};
     if (frame.calibrated) calibration = TwoViewCalibration::calibrated;
     // The size of the images: it says how likely wrong matches fit a model, and where the centre is.
     const Eigen::Vector4d* one = nullptr;
@@ -334,6 +377,14 @@ struct TwoViewInput {
                       "focal lengths of a camera must be finite and positive, its centre finite");
       }
     }
+    if (!(options.focal_length_sigma >= 0 && options.focal_length_sigma < 1) ||
+        !(options.k1_sigma >= 0 && options.k1_sigma < 1)) {
+      return refuse(Status::not_applicable, "standard deviations of focal length and k1 must be in [0, 1)");
+    }
+    if (options.focal_length_sigma > 0 && !options.first) {
+      return refuse(Status::not_applicable,
+                    "a standard deviation of the focal length is one of cameras: none is given");
+    }
     if (options.verticals && !(isDirection(options.verticals->first) && isDirection(options.verticals->second))) {
       return refuse(Status::not_applicable, "verticals must be finite and not zero");
     }
@@ -362,15 +413,14 @@ struct TwoViewInput {
     }
   }
   /// The tests of the cameras at an estimate.
-  std::vector<TwoViewSuspectTest> testSuspects(const TwoViewModel& model,
-                                               const ModelEstimate<TwoViewMotionModel>& estimate,
-                                               std::span<const Eigen::Vector4d> pixels) const {
+  TwoViewCameraTests testCameras(const TwoViewModel& model, const ModelEstimate<TwoViewMotionModel>& estimate,
+                                 std::span<const Eigen::Vector4d> agreeing) const {
     const MatchNoise noise{frame.sigma / first.focalLength(), frame.sigma / second.focalLength()};
     const Eigen::Matrix3d& matrix = estimate.parameter.matrix;
-    return TwoViewSuspects(first, second, same_camera, noise)
+    return TwoViewSuspects(first, second, same_camera, noise, prior_sigmas)
         .test(matrix / matrix.norm(),
               covarianceInPixels(estimate, Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity()),
-              model.freeParameters(), model.equations(), pixels);
+              model.freeParameters(), model.equations(), agreeing);
   }
   void refuse(Status why, const std::string& in_words) { status = why, reason = in_words; }
   static bool isPinhole(const Camera& camera) {
@@ -379,14 +429,30 @@ struct TwoViewInput {
   }
   static bool isDirection(const Eigen::Vector3d& v) { return v.allFinite() && !v.isZero(0); }
 
-  /// Fills the result with the motion of an estimate, using the matches that agree with it.
-  void describe(const TwoViewModel& model, const ModelEstimate<TwoViewMotionModel>& estimate,
+  /// Fills the result with the motion of an estimate, using the matches that agree with it. The priors of the cameras are
+  /// in its covariances.
+  void describe(const TwoViewModel& model, ModelEstimate<TwoViewMotionModel> estimate,
                 std::span<const Eigen::Vector4d> agreeing, TwoViewMotionResult& result) const {
+    std::vector<TwoViewCameraTests::Shift> shifts;
+    if (prior_sigmas[0] > 0 || prior_sigmas[1] > 0) shifts = testCameras(model, estimate, agreeing).shifts;
     const Eigen::Matrix3d to_first = first.pixels().inverse(), K2 = second.pixels();
     const Eigen::Matrix3d to_second = model.equations() == 2 ? K2 : Eigen::Matrix3d(K2.inverse().transpose());
     const Eigen::Matrix3d in_pixels = to_second * estimate.parameter.matrix * to_first;
     result.matrix = in_pixels / in_pixels.norm();
     result.matrix_covariance = covarianceInPixels(estimate, to_second, to_first);
+    // With longer focal lengths the same pixels have smaller coordinates.
+    const Eigen::Matrix3d M = estimate.parameter.matrix / estimate.parameter.matrix.norm();
+    const Eigen::Matrix3d flat = Eigen::Vector3d(1, 1, 0).asDiagonal();
+    const Entries unit = entriesFrom(result.matrix);
+    for (const TwoViewCameraTests::Shift& shift : shifts) {
+      const double of_second = model.equations() == 2 ? shift.second_focal_length : -shift.second_focal_length;
+      const Eigen::Matrix3d moved =
+          matrixFrom(shift.entries) + of_second * flat * M - shift.first_focal_length * M * flat;
+      Entries in_unit = entriesFrom(to_second * moved * to_first) / (to_second * M * to_first).norm();
+      in_unit -= unit.dot(in_unit) * unit;
+      result.matrix_covariance += in_unit * in_unit.transpose();
+    }
+    estimate.covariance = covarianceWithShifts(estimate, shifts);
     result.physical =
         physicalParameters(model.name(), estimate, agreeing, calibration, {first.focalLength(), second.focalLength()});
     result.relative_curvature = estimate.relative_curvature;
@@ -394,7 +460,28 @@ struct TwoViewInput {
       result.relative_pose = Gaussian<Essentiald>{estimate.parameter.pose, estimate.covariance};
     }
   }
+  /// The motion of another model, by its state in a search; its inliers are of `all`, its estimate is from `over`.
+  TwoViewRival rival(const TwoViewModel& model, const ModelState<TwoViewMotionModel>& state,
+                     std::span<const Eigen::Vector4d> all, std::span<const Eigen::Vector4d> over,
+                     const TwoViewMotionOptions& options) const {
+    std::vector<double> errors(all.size());
+    model.errors(state.estimate.parameter, all, errors);
+    std::vector<Eigen::Vector4d> inliers;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (errors[i] < state.threshold) inliers.push_back(all[i]);
+    }
+    TwoViewRival rival;
+    rival.model = model.name(), rival.inliers = inliers.size(), rival.equations = model.equations();
+    describe(model, atShownNoise(model, state, over, options), inliers, rival);
+    return rival;
+  }
 };
+
+inline std::string notToldApart(const std::string& chosen, std::span<const TwoViewRival> rivals) {
+  std::string text = "the matches do not tell apart " + chosen;
+  for (const TwoViewRival& rival : rivals) text += (&rival == &rivals.back() ? " and " : ", ") + rival.model;
+  return text;
+}
 
 }  // namespace detail
 
@@ -437,36 +524,20 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   if (is_beside_still) search.models()[none]->errors({}, input.normalised, still_errors);
   const double still_threshold = search.state(none).threshold;
   std::size_t still = 0;
-  std::vector<Eigen::Vector4d> agreeing, agreeing_pixels;
+  std::vector<Eigen::Vector4d> agreeing, distinct;
   for (std::size_t i = 0; i < matches.size(); ++i) {
     const bool is_still = still_errors[i] < still_threshold;
     still += is_still;
     result.inlier[i] = !is_still && result.errors[i] < state.threshold;
     if (!result.inlier[i]) continue;
     agreeing.push_back(input.normalised[i]);
-    if (input.first_of_equal[i] == i) agreeing_pixels.push_back(matches[i]);
+    if (input.first_of_equal[i] == i) distinct.push_back(input.normalised[i]);
   }
   result.inliers = agreeing.size(), result.threshold = state.threshold;
   const ModelEstimate<TwoViewMotionModel> estimate = detail::atShownNoise(model, state, taking_part, options);
   input.describe(model, estimate, agreeing, result);
-  result.suspects = input.testSuspects(model, estimate, agreeing_pixels);
+  result.suspects = input.testCameras(model, estimate, distinct).tests;
 
-  // The motion of a model of a search over some of the matches.
-  const auto addRival = [&](const detail::TwoViewSearch& of, std::size_t m,
-                            std::span<const Eigen::Vector4d> over) -> const TwoViewRival& {
-    const TwoViewModel& other = *of.models()[m];
-    const ModelState<TwoViewMotionModel>& its = of.state(m);
-    std::vector<double> errors(matches.size());
-    other.errors(its.estimate.parameter, input.normalised, errors);
-    std::vector<Eigen::Vector4d> inliers;
-    for (std::size_t i = 0; i < matches.size(); ++i) {
-      if (errors[i] < its.threshold) inliers.push_back(input.normalised[i]);
-    }
-    TwoViewRival& rival = result.rivals.emplace_back();
-    rival.model = other.name(), rival.inliers = inliers.size(), rival.equations = other.equations();
-    input.describe(other, detail::atShownNoise(other, its, over, options), inliers, rival);
-    return rival;
-  };
   result.status = estimate.status;
   if (search.progress() != HierarchyState::terminated) {
     result.status = Status::not_converged, result.reason = "the search was stopped";
@@ -488,19 +559,20 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
     ModelEstimate<TwoViewMotionModel> at_rest;
     input.describe(*search.models()[none], at_rest, {}, rival);
   } else if (beside_chosen) {
-    const TwoViewRival& rival = addRival(*beside_chosen, beside_chosen->best(), others);
+    const std::size_t m = beside_chosen->best();
+    const TwoViewRival& rival = result.rivals.emplace_back(
+        input.rival(*beside_chosen->models()[m], beside_chosen->state(m), input.normalised, others, options));
     result.status = Status::contested;
     result.reason = "two motions: " + detail::shareInWords(result.inliers, matches.size()) + " follow " + model.name() +
                     ", " + detail::shareInWords(rival.inliers, matches.size()) + " another " + rival.model;
   } else if (const std::vector<std::size_t> set = search.contested(); set.size() > 1) {
-    result.status = Status::contested, result.reason = "the matches do not tell apart " + model.name();
     for (auto m = set.begin() + 1; m != set.end(); ++m) {
-      const TwoViewModel& other = *search.models()[*m];
-      addRival(search, *m, taking_part);
-      result.reason += (m + 1 == set.end() ? " and " : ", ") + other.name();
+      result.rivals.push_back(
+          input.rival(*search.models()[*m], search.state(*m), input.normalised, taking_part, options));
     }
+    result.status = Status::contested, result.reason = detail::notToldApart(model.name(), result.rivals);
     result.shared = detail::sharedParameters(result, result.rivals);
-  } else if (const std::string suspected = suspectsInWords(result.suspects); !suspected.empty()) {
+  } else if (const std::string suspected = detail::refutedCameras(result.suspects); !suspected.empty()) {
     result.status = Status::inconsistent, result.reason = "the matches speak for " + suspected;
   }
   return result;
@@ -546,6 +618,23 @@ LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eige
     structure.status = estimate.status, structure.inliers = std::move(places);
     structure.rms = options.sigma * std::sqrt(fit.normalised());
     input.describe(model, estimate, own, structure);
+    structure.suspects = input.testCameras(model, estimate, own).tests;
+    if (structure.status != Status::ok) {
+      structure.reason = "its estimate did not end, or no covariance would hold";
+      continue;
+    }
+    // A rival may have what is left to all motions.
+    std::vector<Eigen::Vector4d> own_and_rest = own;
+    for (const std::size_t i : search.rest()) own_and_rest.push_back(input.normalised[input.used[i]]);
+    for (const auto& [m, its] : found.rivals) {
+      structure.rivals.push_back(input.rival(*input.models[m], its, own_and_rest, own_and_rest, options));
+    }
+    if (!structure.rivals.empty()) {
+      structure.status = Status::contested, structure.reason = detail::notToldApart(found.name, structure.rivals);
+      structure.shared = detail::sharedParameters(structure, structure.rivals);
+    } else if (const std::string suspected = detail::refutedCameras(structure.suspects); !suspected.empty()) {
+      structure.status = Status::inconsistent, structure.reason = "the matches speak for " + suspected;
+    }
   }
   for (std::size_t i = 0; i < taken.size(); ++i) {
     if (taken[i] == 0) result.rest.push_back(i);
@@ -554,6 +643,11 @@ LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eige
     result.status = Status::not_converged, result.reason = "the search was stopped";
   } else if (!input.fault().empty()) {
     result.status = Status::ill_defined, result.reason = input.fault();
+  }
+  for (std::size_t k = 0; k < result.structures.size() && result.status == Status::ok; ++k) {
+    const TwoViewStructure& structure = result.structures[k];
+    if (structure.status == Status::ok) continue;
+    result.status = structure.status, result.reason = "motion " + std::to_string(k + 1) + ": " + structure.reason;
   }
   return result;
 }

@@ -20,23 +20,36 @@
 
 namespace liestat::detail {
 
+/// The tests of the cameras at an estimate.
+struct TwoViewCameraTests {
+  std::vector<TwoViewSuspectTest> tests;
+  /// The movement of the estimate's matrix, of norm one, that the priors of the cameras stand for: a standard deviation of
+  /// each suspect; and by how much, relatively, the focal length of each image is then longer.
+  struct Shift {
+    Entries entries = Entries::Zero();
+    double first_focal_length = 0, second_focal_length = 0;
+  };
+  std::vector<Shift> shifts;
+};
+
 /// The tests at an estimate from matches that agree with it. Each match gives one row for each equation: with
 /// c(û) + D (u - û) = 0 at the point û of the model next to the measured u, the whitened c, its derivatives along the
 /// free directions of the matrix, and those by the cameras, through the coordinates.
 class TwoViewSuspects {
  public:
+  /// `prior_sigmas`: of focal lengths and of k1, 0 where they are known.
   TwoViewSuspects(const TwoViewCoordinates& first, const TwoViewCoordinates& second, bool same_camera,
-                  const MatchNoise& noise)
+                  const MatchNoise& noise, const std::array<double, 2>& prior_sigmas)
       : images_{Image(first), Image(second)},
         same_camera_(same_camera),
+        prior_sigmas_(prior_sigmas),
         noise_(noise.first, noise.first, noise.second, noise.second) {}
 
-  /// `matrix` is H or F of norm one in the models' coordinates, with the covariance of its entries. None for a model
-  /// without parameters, without a covariance, or with few matches.
-  std::vector<TwoViewSuspectTest> test(const Eigen::Matrix3d& matrix, const Eigen::MatrixXd& covariance,
-                                       int free_parameters, int equations,
-                                       std::span<const Eigen::Vector4d> pixels) const {
-    const std::size_t most = pixels.size() * static_cast<std::size_t>(equations);
+  /// `matrix` is H or F of norm one in the models' coordinates, as the matches are, with the covariance of its entries.
+  /// None for a model without parameters, without a covariance, or with few matches.
+  TwoViewCameraTests test(const Eigen::Matrix3d& matrix, const Eigen::MatrixXd& covariance, int free_parameters,
+                          int equations, std::span<const Eigen::Vector4d> matches) const {
+    const std::size_t most = matches.size() * static_cast<std::size_t>(equations);
     if (covariance.rows() != 9 || !covariance.allFinite() || free_parameters > max_free ||
         most < min_freedom + static_cast<std::size_t>(free_parameters)) {
       return {};
@@ -54,10 +67,7 @@ class TwoViewSuspects {
       }
     }
     const Entries q = entriesFrom(matrix);
-    for (const Eigen::Vector4d& pixel : pixels) {
-      Eigen::Vector4d u;
-      u << images_[0].given(pixel.head<2>()), images_[1].given(pixel.tail<2>());
-      if (!u.allFinite()) continue;
+    for (const Eigen::Vector4d& u : matches) {
       if (equations == 2) {
         addRows<2>(
             HomographyEquation{}.linearize(q, u), [&](const auto& at) { return HomographyEquation{}.linearize(q, at); },
@@ -71,11 +81,15 @@ class TwoViewSuspects {
       }
     }
     // As in the covariance, the noise is not less than stated.
-    const auto found = scoreTests<1, max_free, suspects>(std::move(rows), ScoreTestOptions<suspects>{});
-    std::vector<TwoViewSuspectTest> tests;
+    ScoreTestOptions<suspects> options;
+    for (std::size_t k = 0; k < suspects; ++k) {
+      if (!same_camera_ || k % 2 == 0) options.prior_sigmas[k] = prior_sigmas_[k / 2];
+    }
+    const auto found = scoreTests<1, max_free, suspects>(std::move(rows), options);
+    TwoViewCameraTests result;
     for (int k = 0; k < suspects; ++k) {
       if (same_camera_ && k % 2 == 1) continue;
-      TwoViewSuspectTest& test = tests.emplace_back();
+      TwoViewSuspectTest& test = result.tests.emplace_back();
       // An estimate whose standard deviation is the whole quantity comes of rounding alone.
       if (found.suspects[static_cast<std::size_t>(k)].sigma < 1) {
         static_cast<SuspectTest&>(test) = found.suspects[static_cast<std::size_t>(k)];
@@ -84,8 +98,14 @@ class TwoViewSuspects {
       test.name = k < 2 ? "focal length" : "k1";
       if (!same_camera_) test.name += k % 2 == 0 ? " of the first camera" : " of the second camera";
       test.unit = k < 2 ? "" : "1";
+      test.prior_sigma = options.prior_sigmas[static_cast<std::size_t>(k)];
+      if (!(test.prior_sigma > 0)) continue;
+      auto& shift = result.shifts.emplace_back();
+      shift.entries = test.prior_sigma * directions * found.shifts.col(k);
+      if (k == 0) shift.first_focal_length = test.prior_sigma;
+      if (k == 1 || (k == 0 && same_camera_)) shift.second_focal_length = test.prior_sigma;
     }
-    return tests;
+    return result;
   }
 
  private:
@@ -155,6 +175,7 @@ class TwoViewSuspects {
 
   std::array<Image, 2> images_;
   bool same_camera_;
+  std::array<double, 2> prior_sigmas_;
   Eigen::Vector4d noise_;
 };
 
