@@ -363,6 +363,34 @@ class MeanResult:
             raise ValueError(f"no confidence region: {self.reason}")
         return ConfidenceRegion(self.mean, self.covariance, probability, self.law)
 
+    def plot(self, x=None, ax=None, probability=0.95):
+        """Draws a single mean and its confidence region with matplotlib: a direction stereographically about itself, a
+        heading on the circle, a rotation as its three axes, a position or a pose with the ellipsoid of its position.
+        Regions are those of all coordinates together, as `confidence_region`, seen along what is drawn.
+
+        Parameters
+        ----------
+        x : the type of the features, optional
+            Features to draw as dots.
+        ax : matplotlib axes, optional
+            With ``projection="3d"`` but for directions, headings and SE2. Default: those of a new figure.
+        probability : float
+            Of the region; there is none where the covariance is withheld.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is not installed.
+        """
+        from ._plot import plot_mean
+
+        self._single("plot")
+        return plot_mean(self, x, ax, probability)
+
     def p_value(self, x):
         """The probability that an estimate is as far from the truth as this one is from `x`, were `x` the truth.
 

@@ -114,6 +114,7 @@ def mean(
     keepdims=False,
     by=None,
     robust=None,
+    nan_policy="raise",
 ):
     """The mean of features, with its covariance and a certificate that it is the only one.
 
@@ -189,6 +190,9 @@ def mean(
         metric, translation and rotation, by its own distance and scale (`scales`); SE2 and SE3 as frames. `outliers`
         lists the features that the noise of the others does not explain, with family-wise p. A covariance needs 20
         features whose outliers are not on one side: else it is withheld, with status 'inconsistent'.
+    nan_policy : {'raise', 'omit'}
+        What becomes of features that are not finite, as `fuse` returns them where it refuses: an error, or they are left
+        out with their weights, covariances, times and labels. Indices of features count those that are left.
 
     Returns
     -------
@@ -223,8 +227,21 @@ def mean(
         criterion = "lsq"
     if by is not None and (axis is not None or keepdims):
         raise ValueError("mean: by: labels reduce all axes; no axis or keepdims")
+    if nan_policy not in ("raise", "omit"):
+        raise ValueError(f"mean: nan_policy: expected 'raise' or 'omit', got {nan_policy!r}")
     kind, criterion, groups, lead = _requests(
-        "mean", x, weights, covariances, axis, criterion, covariance_at, likelihood, times, factors, deviations
+        "mean",
+        x,
+        weights,
+        covariances,
+        axis,
+        criterion,
+        covariance_at,
+        likelihood,
+        times,
+        factors,
+        deviations,
+        nan_policy == "omit",
     )
     if robust is not None:
         criterion, groups = robust, [dict(group, criterion=robust) for group in groups]
@@ -248,6 +265,8 @@ def mean(
     if by is not None:
         labels, groups = _by_label(groups[0], np.asarray(by), np.shape(require_manifold(x, "mean").params)[:-1])
         lead = labels.shape
+    if nan_policy == "omit":
+        groups = [_finite(group) for group in groups]
     if symmetry is not None:
         if kind is not SO3:
             raise TypeError(f"mean: symmetry is that of rotations, SO3, not of {kind.__name__}")
@@ -295,6 +314,13 @@ def mean(
     return result
 
 
+def _finite(group):
+    """The arguments of the extension without the features that are not finite."""
+    kept = np.isfinite(group["features"]).all(axis=-1)
+    lists = ("features", "weights", "covariances", "times")
+    return dict(group, **{name: group[name][kept] for name in lists if len(group[name]) == len(kept)})
+
+
 def _by_label(group, by, shape):
     """The sorted labels, and the arguments of the extension for the features of each."""
     if by.shape != shape:
@@ -322,6 +348,7 @@ def _requests(
     times,
     factors=None,
     deviations=None,
+    omits_nan=False,
 ):
     """The type, the criterion, the arguments of the extension for each mean, and the shape of the means."""
     x = require_manifold(x, caller)
@@ -364,7 +391,8 @@ def _requests(
             raise ValueError(f"{caller}: criterion 'lsq' takes covariances in the axes of the estimate, else 'maha'")
         covariance_at = "estimated"
     axes = _axes(axis, x.ndim, caller)
-    require_finite(x.params, f"{caller}: x")
+    if not omits_nan:
+        require_finite(x.params, f"{caller}: x")
     features, lead = _grouped(np.ascontiguousarray(x.params), axes, x.ndim)
 
     def one_for_each(values, what):

@@ -195,6 +195,27 @@ class Means(unittest.TestCase):
             with self.assertRaisesRegex(ValueError, "by"):
                 liestat.mean(x, **wrong)
 
+    def test_features_that_are_not_finite_are_left_out_if_asked(self):
+        params = liestat.SO3.exp(0.1 * np.random.default_rng(3).normal(size=(4, 6, 3))).params.copy()
+        params[0, 2] = params[3, 5, 1] = np.nan
+        x, times = liestat.SO3._of(params), np.arange(24.0).reshape(4, 6)
+        with self.assertRaisesRegex(ValueError, r"not finite at index \(0, 2, 0\)"):
+            liestat.mean(x)
+        with self.assertRaisesRegex(ValueError, "nan_policy: expected 'raise' or 'omit'"):
+            liestat.mean(x, nan_policy="drop")
+        kept = np.isfinite(params).all(axis=-1)
+        good = liestat.SO3(params[kept])
+        weights = np.linspace(1, 2, 24).reshape(4, 6)
+        found = liestat.mean(x, weights=weights, times=times, nan_policy="omit")
+        right = liestat.mean(good, weights=weights[kept], times=times[kept])
+        self.assertEqual(found.n, 22)
+        np.testing.assert_array_equal(found.covariance, right.covariance)
+        self.assertEqual(liestat.mean(x, axis=1, nan_policy="omit").n.tolist(), [5, 6, 6, 5])
+        labels = np.broadcast_to(np.arange(2).repeat(3), (4, 6))
+        self.assertEqual(liestat.mean(x, by=labels, nan_policy="omit").n.tolist(), [11, 11])
+        with self.assertWarns(UserWarning):
+            self.assertEqual(liestat.mean(liestat.SO3._of(np.full((3, 4), np.nan)), nan_policy="omit").status, "too_few")
+
     def test_lists_and_keepdims(self):
         """Lists of elements, SciPy's rotations and lists of them are arrays; keepdims keeps the reduced axes."""
         x = support.features("SO3", 6)
