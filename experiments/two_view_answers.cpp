@@ -108,8 +108,7 @@ std::vector<TwoViewAnswerRow> validateTwoViewAnswers(const TwoViewAnswers& valid
     row.marked = row.trials - row.right - row.wrong;
     const std::size_t answered = row.right + row.wrong + row.contested;
     row.passed = isBelow(row.wrong, row.trials, row.max_wrong) && isBelow(row.outside, row.poses, max_outside) &&
-                 (!row.min_in_set ||
-                  isBelow(answered - row.right - row.right_in_set, answered, 1 - *row.min_in_set));
+                 (!row.min_in_set || isBelow(answered - row.right - row.right_in_set, answered, 1 - *row.min_in_set));
     rows.push_back(std::move(row));
   }
   return rows;

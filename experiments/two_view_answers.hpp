@@ -23,9 +23,9 @@ struct TwoViewAnswers {
 struct TwoViewAnswerRow {
   std::string scene;
   std::size_t trials = 0;
-  std::size_t right = 0;   ///< ok, and the right model
-  std::size_t marked = 0;  ///< not ok
-  std::size_t wrong = 0;   ///< ok, and another model
+  std::size_t right = 0;                        ///< ok, and the right model
+  std::size_t marked = 0;                       ///< not ok
+  std::size_t wrong = 0;                        ///< ok, and another model
   std::size_t contested = 0, right_in_set = 0;  ///< of the marked ones; with the right model in the set
   std::size_t right_contested = 0;              ///< contested although the right model was chosen
   /// Of the right ones with a relative pose: those with the truth outside of the region of 95 %.

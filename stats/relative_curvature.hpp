@@ -18,16 +18,20 @@ struct RelativeCurvature {
   /// along the model. It looks like information and is none: a line whose points spread by their noise alone has 1.
   double noise_share = intrinsic;
   double bias = intrinsic;  ///< second-order bias of the estimate, in standard deviations
+  /// A covariance that would be widened by more is believed no longer.
+  double max_widening = std::numeric_limits<double>::infinity();
 
   bool tested() const { return !std::isnan(parameter); }
   /// The curvature under noise that is larger by a factor than stated.
   RelativeCurvature at(double scale) const {
-    return {scale * intrinsic, scale * parameter, scale * scale * noise_share, scale * bias};
+    return {scale * intrinsic, scale * parameter, scale * scale * noise_share, scale * bias, max_widening};
   }
   /// Regions of first order were seen to hold below these bounds, in all kinds of docs/constrained.md.
   bool small() const { return parameter <= 0.13 && intrinsic <= 0.08 && noise_share <= 0.05 && bias <= 0.25; }
   /// Widened regions were seen to hold up to these, and are worth little beyond.
-  bool large() const { return parameter > 0.8 || intrinsic > 0.6 || noise_share > 0.5 || bias > 0.6; }
+  bool large() const {
+    return parameter > 0.8 || intrinsic > 0.6 || noise_share > 0.5 || bias > 0.6 || widening() > max_widening;
+  }
   /// Between the two: covariances are widened.
   bool widens() const { return tested() && !small() && !large(); }
   /// The factor of a covariance whose region holds between the two. The edge of the region is off by the relative

@@ -790,6 +790,30 @@ TEST(TwoViewSuspects, EachCameraHasItsOwn) {
   EXPECT_TRUE(none.suspects[1].tested());
 }
 
+// Poses of short baselines that were `ok` and up to 110 standard deviations off: their covariances were widened by a
+// factor of 14 to 75, or rested on a match beside the epipole.
+TEST(TwoViewMotion, covariancesThatWouldBeWidenedMuchAreWithheld) {
+  struct Case {
+    double baseline;
+    std::uint64_t seed;
+  };
+  for (const auto& [baseline, seed] : {Case{0.03, 77000368},
+                                       {0.03, 77000489},
+                                       {0.05, 77000236},
+                                       {0.05, 77000344},
+                                       {0.08, 77000400},
+                                       {0.08, 77000476}}) {
+    TwoViewSceneOptions of{.motion = TwoViewMotion::essential, .outliers = 0.1};
+    of.min_baseline = of.max_baseline = baseline;
+    const TwoViewScene scene(of, seed);
+    TwoViewMotionOptions options = optionsOf(scene);
+    options.search.seed = seed;
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, options);
+    EXPECT_FALSE(found.ok() && found.chosenModel().name == "essential") << seed;
+    EXPECT_FALSE(found.relative_pose && found.relative_pose->covariance.allFinite()) << seed;
+  }
+}
+
 // Cameras whose focal lengths and distortions are known with a standard deviation that is stated. Where they are taken
 // for known, the squared errors of these poses are some tens of times what the covariances claim.
 TEST(TwoViewPriors, CovariancesContainThem) {

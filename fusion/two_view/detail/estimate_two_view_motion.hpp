@@ -221,7 +221,9 @@ inline ModelEstimate<TwoViewMotionModel> atShownNoise(const TwoViewModel& model,
       estimate.status = last.status;
     }
   }
-  const RelativeCurvature shown = estimate.relative_curvature.at(std::sqrt(noise));
+  RelativeCurvature shown = estimate.relative_curvature.at(std::sqrt(noise));
+  // Of poses whose covariances were widened by more, every fifth was outside of its region (docs/two_view.md).
+  shown.max_widening = 9;
   estimate.covariance *= noise * shown.widening() / estimate.relative_curvature.widening();
   estimate.information /= noise;
   estimate.relative_curvature = shown;
