@@ -183,7 +183,10 @@ EqualityTest dispersionTest(const std::vector<MatrixXd>& groups, const Compariso
     return sum + dof * logDeterminant(pooled / dof);
   };
   EqualityTest test{statistic()};
-  Draws draws{options.resamples};
+  // Some ten seconds at most.
+  constexpr double most_rows = 2e8;
+  Draws draws{std::min(options.resamples,
+                       std::max<std::size_t>(199, static_cast<std::size_t>(most_rows / static_cast<double>(n))))};
   CounterRng rng(options.seed, 2);
   while (draws.goOn()) {
     for (std::size_t i = order.size(); i > 1; --i) {

@@ -592,11 +592,12 @@ void testSpecialCases(const Core& core, const MatrixXd& features, LawFit& fit) {
   fit.symmetry = likelihoodRatio(core.log_likelihood, less, core.girdle ? 1 : factor, d * (d + 1) / 2 - 1);
 }
 
-/// Adds to the covariance of κ the outer product of the bias that sorting brings: as eigenvalues of a matrix κ repel each
-/// other where they differ by less than a few standard deviations of the element off the diagonal, whose variances are
-/// given. Of an observed gap g the squared one of the truth is g² less four of these in expectation.
-void widenBySorting(const VectorXd& kappa, const MatrixXd& variances, MatrixXd& covariance) {
-  VectorXd bias = VectorXd::Zero(kappa.size());
+/// Adds to the covariance of several κ the outer product of their bias: that of maximum likelihood, 3 κ/n, and that of
+/// sorting. As eigenvalues of a matrix κ repel each other where they differ by less than a few standard deviations of the
+/// element off the diagonal, whose variances are given: of an observed gap g the truth's square is g² less four of these
+/// in expectation.
+void widenByBias(const VectorXd& kappa, const MatrixXd& variances, double n, MatrixXd& covariance) {
+  VectorXd bias = 3 / n * kappa;
   for (Index i = 0; i < kappa.size(); ++i) {
     for (Index j = i + 1; j < kappa.size(); ++j) {
       const double gap = kappa[i] - kappa[j];
@@ -628,8 +629,8 @@ void setCovariances(const Core& core, const Reference& reference, LawFit& fit) {
     }
     MatrixXd across = MatrixXd::Zero(3, 3);
     across(0, 1) = inverse(4, 4), across(0, 2) = inverse(5, 5), across(1, 2) = inverse(7, 7);
-    widenBySorting(core.law.kappa, across.cwiseProduct(core.law.kappa * core.law.kappa.transpose()),
-                   fit.kappa_covariance);
+    widenByBias(core.law.kappa, across.cwiseProduct(core.law.kappa * core.law.kappa.transpose()), n,
+                fit.kappa_covariance);
     const MatrixXd back = core.law.axes * tau.asDiagonal();
     const detail::SymmetricEigen<MatrixXd> eigen(MatrixXd(back * inverse.topLeftCorner(3, 3) * back.transpose()));
     directions = eigen.vectors, variances = of_residuals * eigen.values;
@@ -645,7 +646,7 @@ void setCovariances(const Core& core, const Reference& reference, LawFit& fit) {
         design.factor * design.factor / n * MatrixXd(scale.asDiagonal() * inverseOf(correlation) * scale.asDiagonal());
     if (core.nu.size() > 1) {
       const MatrixXd across = design.factor * design.factor / (4 * n) * m.fourth.cwiseInverse();
-      widenBySorting(core.law.kappa, across, fit.kappa_covariance);
+      widenByBias(core.law.kappa, across, n, fit.kappa_covariance);
     }
     if (model == LawModel::vmf || model == LawModel::von_mises) {
       fit.mean_resultant = 1 - 2 * core.x.leftCols(d).squaredNorm() / n;
