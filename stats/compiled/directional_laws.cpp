@@ -225,7 +225,7 @@ Core fitWrappedNormal(const MatrixXd& features, bool isotropic, double tolerance
   DirectionalLaw frame{LawModel::wrapped_normal, mode, MatrixXd::Identity(3, 3), {}};
   Matrix3d sigma = Matrix3d::Zero();
   MatrixXd axes = Matrix3d::Identity();
-  Vector3d deviations;
+  Vector3d deviations = Vector3d::Zero();
   MatrixXd logs(features.rows(), 3);
   core.settled = false;
   for (int iteration = 0; iteration < 500 && !core.settled; ++iteration) {
