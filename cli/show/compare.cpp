@@ -54,8 +54,9 @@ TableRows pairRows(const GroupComparison& found) {
 
 std::string formatComparison(const ComparisonOutput& output) {
   const GroupComparison& found = output.comparison;
-  std::string text = fmt::format("{} groups, feature {}{}\n{}\n", found.groups.size(), output.feature,
-                                 found.paired ? ", in pairs" : "", found.verdict().text);
+  // Groups that have no pooled mean are not listed.
+  std::string text = found.groups.empty() ? "" : fmt::format("{} groups, ", found.groups.size());
+  text += fmt::format("feature {}{}\n{}\n", output.feature, found.paired ? ", in pairs" : "", found.verdict().text);
   if (std::isnan(found.means.p)) return text;
   text += "\n" + Table(testRows(found)).str() + "\n" + Table(groupRows(found)).str();
   return found.pairs.size() > 1 || found.paired ? text + "\n" + Table(pairRows(found)).str() : text;
