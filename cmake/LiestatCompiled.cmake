@@ -3,22 +3,25 @@
 #
 #   means          Fréchet, Mahalanobis and certified means of the common features in double; states that merge
 #   estimation     the cores of constrained estimation and of the implicit filter
+#   laws           laws of directions and rotations, comparisons of groups (Random123)
 #   fusion         the estimators of fusion/, but for those of trajectories (Random123)
 #   trajectories   evaluation and conversion of trajectories, diagnosis of conventions, inertial windows against a truth
 #                  (Boost.Math, Random123)
 #   formats        readers and writers of files (Boost.Math, {fmt}, zlib, yaml-cpp, nlohmann/json; bags of ROS also use bzip2,
 #                  lz4, zstd, SQLite)
 
-set(LIESTAT_COMPILED_PARTS means estimation fusion trajectories formats)
+set(LIESTAT_COMPILED_PARTS means estimation laws fusion trajectories formats)
 
 set(LIESTAT_COMPILED_SOURCES_means
     mean maha crystal_mean certified_mean certified_maha certified_group_mean robust_mean state state_finish)
 set(LIESTAT_COMPILED_SOURCES_estimation constrained implicit_ekf fits)
+set(LIESTAT_COMPILED_SOURCES_laws directional_laws compare_groups)
 set(LIESTAT_COMPILED_SOURCES_fusion
     initialisation initialisation_truth recording noise_calibration homography_models epipolar_models pose_models
     robust_two_view two_view hand_eye motion)
 set(LIESTAT_COMPILED_SOURCES_trajectories
     trajectories evaluate trajectory_misfit convention_diagnosis trajectory_conversion recording_windows)
+set(LIESTAT_COMPILED_NEEDS_laws random123)
 set(LIESTAT_COMPILED_NEEDS_fusion random123)
 set(LIESTAT_COMPILED_NEEDS_trajectories boost random123)
 set(LIESTAT_COMPILED_NEEDS_formats boost fmt json yaml zlib)
@@ -55,7 +58,7 @@ function(liestat_compiled part root library)
     liestat_compiled(${use} ${root} ${library})
   endforeach()
   set(directory fusion/compiled)
-  if(part STREQUAL "means" OR part STREQUAL "estimation")
+  if(part MATCHES "^(means|estimation|laws)$")
     set(directory stats/compiled)
   endif()
   # With it the headers know that their definitions are linked (stats/detail/compiled.hpp, fusion/detail/compiled.hpp,

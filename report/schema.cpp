@@ -15,6 +15,8 @@
 #include <fusion/trajectory_conversion.hpp>
 #include <fusion/two_view/two_view_types.hpp>
 #include <fusion/visual_inertial_truth_types.hpp>
+#include <stats/compare_groups_types.hpp>
+#include <stats/directional_laws.hpp>
 #include <stats/fit_summary_types.hpp>
 #include <stats/mean_summary.hpp>
 #include <stats/split_validation_types.hpp>
@@ -52,14 +54,24 @@ ResultType typeOf() {
 }
 
 std::vector<ResultType> allResults() {
-  return {typeOf<MeanSummary>(),          typeOf<SplitSummary>(),
-          typeOf<TrajectoryEvaluation>(), typeOf<TrajectoryConversion>(),
-          typeOf<CovarianceDiagnosis>(),  typeOf<RecordingWindows>(),
-          typeOf<ComparedWindow>(),       typeOf<ComparedStretch>(),
-          typeOf<ComparedRecording>(),    typeOf<NoiseCalibration>(),
-          typeOf<HandEyeResult>(),        typeOf<TwoViewMotionEstimate>(),
-          typeOf<TwoViewMotions>(),       typeOf<MotionFrame>(),
-          typeOf<MotionResult>(),         typeOf<FitSummary>()};
+  return {typeOf<MeanSummary>(),
+          typeOf<SplitSummary>(),
+          typeOf<TrajectoryEvaluation>(),
+          typeOf<TrajectoryConversion>(),
+          typeOf<CovarianceDiagnosis>(),
+          typeOf<RecordingWindows>(),
+          typeOf<ComparedWindow>(),
+          typeOf<ComparedStretch>(),
+          typeOf<ComparedRecording>(),
+          typeOf<NoiseCalibration>(),
+          typeOf<HandEyeResult>(),
+          typeOf<TwoViewMotionEstimate>(),
+          typeOf<TwoViewMotions>(),
+          typeOf<MotionFrame>(),
+          typeOf<MotionResult>(),
+          typeOf<FitSummary>(),
+          typeOf<LawFit>(),
+          typeOf<GroupComparison>()};
 }
 
 std::string typeInWords(const FieldDescription& f) {

@@ -11,6 +11,7 @@ void addMotionCommand(const CommandList& program);
 void addPreintegrateCommand(const CommandList& program);
 void addViInitCommand(const CommandList& program);
 void addTwoViewCommand(const CommandList& program);
+void addCompareCommand(const CommandList& program);
 void addConvertCommand(const CommandList& program);
 void addDoctorCommand(const CommandList& program);
 void addEvaluateCommand(const CommandList& program);

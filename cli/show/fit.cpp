@@ -6,6 +6,7 @@
 #include <report/table.hpp>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -117,7 +118,55 @@ TableRows covarianceRows(const FitSummary& fit) {
   return table;
 }
 
+TableRows lawRows(const LawFit& fit) {
+  TableRows table{{"parameter", "value", "sd"}};
+  for (std::size_t i = 0; i < fit.names.size() && fit.law.kappa.size() > 0; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    table.rows.push_back({fit.names[i], number(fit.law.kappa[k], 7), number(fit.kappaDeviation(k), 2)});
+  }
+  return table;
+}
+
+TableRows lawTests(const LawFit& fit) {
+  TableRows table{{"test", "chi2", "dof", "p"}};
+  const auto add = [&](const char* what, const LawTest& test) {
+    if (!std::isnan(test.p)) {
+      table.rows.push_back({what, number(test.statistic), cell(test.degrees_of_freedom), number(test.p, 2)});
+    }
+  };
+  add("goodness of fit", fit.goodness), add("uniform", fit.uniformity), add("rotational symmetry", fit.symmetry);
+  return table;
+}
+
+std::string lawSummary(const LawOutput& output) {
+  const LawFit& fit = output.fit;
+  std::string text = fmt::format("{}: {} features of {}\n", name(fit.law.model), fit.n, output.file);
+  if (fit.confidence_angles.empty()) return text;
+  std::vector<std::string> place, angles;
+  for (const double x : fit.law.location) place.push_back(number(x, 7));
+  for (const double angle : fit.confidence_angles) angles.push_back(number(degrees * angle, 4));
+  text += fmt::format("{} {}\n", fit.girdle ? "pole of the girdle" : "location", fmt::join(place, " "));
+  text += fmt::format("95 % region of the location, half axes: {} deg\n", fmt::join(angles, ", "));
+  return text;
+}
+
 }  // namespace
+
+std::string formatLaw(const LawOutput& output) {
+  std::string text = lawSummary(output) + output.fit.verdict().text + "\n";
+  if (output.fit.kappa_covariance.size() == 0) return text;
+  return text + "\n" + Table(lawRows(output.fit)).str() + "\n" + Table(lawTests(output.fit)).str();
+}
+
+void writeLawReport(const std::string& directory, const std::string& command_line, const LawOutput& output) {
+  Report report(directory, fmt::format("A fit of the law {}", name(output.fit.law.model)));
+  report.verdict(output.fit.verdict());
+  report.code(command_line);
+  report.paragraph(lawSummary(output));
+  report.table(lawRows(output.fit), "Concentrations; angles in rad.");
+  report.table(lawTests(output.fit), "The p of the goodness of fit is Bonferroni's of several moments.");
+  printLines("\n" + report.write() + "\n");
+}
 
 std::string formatFit(const FitOutput& output) {
   return summary(output) + output.fit.verdict().text + "\n\n" + Table(parameterRows(output.fit)).str();

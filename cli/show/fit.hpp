@@ -1,5 +1,6 @@
 #pragma once
 
+#include <stats/directional_laws.hpp>
 #include <stats/fit_summary_types.hpp>
 
 #include <Eigen/Core>
@@ -20,6 +21,19 @@ void describe(V& v, const FitOutput& output) {
   describe(v, output.fit);
   describeSeries(v, output.fit);
 }
+
+/// A law that `liestat fit --law` shows.
+struct LawOutput {
+  std::string file;
+  LawFit fit;
+};
+template <class V>
+void describe(V& v, const LawOutput& output) {
+  v("file", output.file);
+  describe(v, output.fit);
+}
+std::string formatLaw(const LawOutput& output);
+void writeLawReport(const std::string& directory, const std::string& command_line, const LawOutput& output);
 
 /// Verdict and parameters, for the terminal.
 std::string formatFit(const FitOutput& output);

@@ -8,7 +8,7 @@
 //   small_factors.hpp      A Aᵀ as a covariance, factors along principal axes
 //   small_reduced.hpp      square roots of semi-definite matrices: closest, and reduced to independent rows
 //   small_columns.hpp      3×3 blocks in vector registers
-//   small_products.hpp     products of more rows than that, and A C Aᵀ
+//   small_products.hpp     products of more rows than that, and A C Aᵀ; small_solve.hpp: equations of run-time sizes
 //   nearest_rotation.hpp   the rotation nearest to a 3×3 matrix
 //   trig.hpp               cross-product matrices, beside the coefficients that they are multiplied with
 #pragma once

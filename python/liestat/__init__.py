@@ -76,7 +76,7 @@ from ._sensors import (
     vi_init,
 )
 from ._state import State
-from ._statistics import fit, group_mean, mahalanobis, mean, validate_split
+from ._statistics import compare, fit, fit_law, group_mean, mahalanobis, mean, validate_split
 from ._trajectories import TrajectoryEvaluation, evaluate_trajectory
 
 __version__ = _core.__version__

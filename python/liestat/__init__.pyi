@@ -370,6 +370,14 @@ def mahalanobis(
 def fit(
     points: ArrayLike, model: str, sigma: float | None = None, *, birge: bool = False
 ) -> _FitSummary: ...
+def fit_law(x: Manifold, law: str, *, seed: int = 1) -> _LawFit: ...
+def compare(
+    *groups: Manifold,
+    by: ArrayLike | None = None,
+    paired: bool = False,
+    level: float = 0.05,
+    seed: int = 1,
+) -> _GroupComparison: ...
 def fuse(
     x: Manifold | Gaussian,
     covariances: ArrayLike | None = None,
@@ -1315,6 +1323,69 @@ class _FitSummary(Result):
     widening: float  # factor of the covariance that the curvature asks for
     iterations: int
     distances: _Array  # of the points from the model, in their order
+
+class _LawTest(Result):
+    statistic: float
+    degrees_of_freedom: int  # of chi-squared
+    p: float
+
+class _LawFit(Result):
+    law: str
+    n: int
+    status: str  # the status
+    reason: str
+    verdict: str  # the verdict in a sentence
+    consistent: bool | None  # whether; null: no verdict
+    causes: list[str]  # tests that speak against it, each with its likely cause
+    location: _Array  # mean direction, mode, or pole of a girdle: cos sin, x y z, or x y z w
+    location_covariance: _Array  # in the local frame; rad²
+    confidence_angles: _Array  # half axes of the 95 % region, the longest first; rad
+    names: list[str]  # of kappa
+    kappa: _Array  # concentrations
+    kappa_covariance: _Array
+    axes: _Array  # columns that kappa belongs to
+    girdle: bool  # of bingham: the location is the pole of a great circle
+    mean_resultant: float  # length of the mean vector; of vmf and von-mises
+    log_likelihood: float  # relative to the uniform law
+    uniformity: _LawTest  # likelihood ratio against the uniform law
+    symmetry: _LawTest  # against rotational symmetry about the location
+    goodness: _LawTest  # moments against those of the law
+    replicates: int  # of the bootstrap behind goodness.p; 0: by chi-squared
+
+class _ComparedGroup(Result):
+    name: str
+    n: int
+    offset: _Array  # of the group's mean, in the tangent space at the pooled mean
+    dispersion: _Array  # covariance of a feature of the group
+
+class _EqualityTest(Result):
+    statistic: float
+    numerator_dof: float  # of F; null: by resampling
+    denominator_dof: float  # of F; null: by resampling
+    p: float
+
+class _ComparedPair(Result):
+    first: int  # index of a group
+    second: int  # index of a group
+    difference: _Array  # of the means, second less first
+    covariance: _Array  # of the difference
+    means: _EqualityTest
+    adjusted_p: float  # family-wise over all pairs, by Holm
+
+class _GroupComparison(Result):
+    status: str  # the status
+    reason: str
+    verdict: str  # the verdict in a sentence
+    consistent: bool | None  # whether; null: no verdict
+    causes: list[str]  # tests that speak against it, each with its likely cause
+    paired: bool
+    level: float  # of the verdict
+    pooled_mean: _Array  # parameters of the feature in whose tangent space all is
+    groups: list[_ComparedGroup]
+    means: _EqualityTest  # equality of means, whatever the dispersions
+    means_if_alike: _EqualityTest  # equality of means if dispersions are equal: Hotelling's or Wilks'
+    dispersions: _EqualityTest  # equality of dispersions, by permutation
+    pairs: list[_ComparedPair]  # of groups
 
 # end of fields
 

@@ -569,3 +569,101 @@ def fit(points, model, sigma=None, *, birge=False):
     if d["status"] != "ok":
         warnings.warn(f"liestat.fit: {d['verdict']}", UserWarning, stacklevel=2)
     return Result.of(f"fit of a {model}", d)
+
+
+_LAWS = {"vmf": "S2", "bingham": "S2", "von-mises": "SO2", "matrix-fisher": "SO3", "wrapped-normal": "SO3"}
+
+
+def fit_law(x, law, *, seed=1):
+    """The law of directions, axes, headings or rotations with the largest likelihood, with tests of it.
+
+    Parameters
+    ----------
+    x : S2, SO2 or SO3, shape (n,)
+    law : {'vmf', 'bingham', 'von-mises', 'matrix-fisher', 'wrapped-normal'}
+        vmf and bingham of S2, von-mises of SO2, the others of SO3 (docs/laws.md).
+    seed : int
+        Of the bootstrap behind the p of the goodness of fit.
+
+    Returns
+    -------
+    Result
+        The fields of ``liestat fit --law --json`` (docs/laws.md): `status`, `location`, `kappa`, `kappa_covariance`,
+        `confidence_angles`, `goodness`, `uniformity`, `symmetry`, `verdict`, ...
+
+    Warns
+    -----
+    UserWarning
+        Where the status is not ok.
+    """
+    if law not in _LAWS:
+        raise ValueError(f"fit_law: law: expected one of {', '.join(_LAWS)}, got {law!r}")
+    x = require_manifold(x, "fit_law")
+    if type(x).__name__ != _LAWS[law] or x.ndim != 1:
+        raise TypeError(f"fit_law: {law} is a law of {_LAWS[law]} of shape (n,), got {type(x).__name__} of {x.shape}")
+    d = _core.fit_law(law, np.ascontiguousarray(require_finite(x.params, "fit_law: x")), int(seed))
+    if d["status"] != "ok":
+        warnings.warn(f"liestat.fit_law: {d['verdict']}", UserWarning, stacklevel=2)
+    return Result.of(f"law {law}", d)
+
+
+_COMPARED = {
+    "R3": "point",
+    "SO3": "rotation",
+    "Frame3": "frame",
+    "SemiOrientedFrame3": "semi_oriented_frame",
+    "NonOrientedFrame3": "non_oriented_frame",
+    "SE3": "se3",
+    "S2": "direction",
+    "SO2": "heading",
+}
+
+
+def compare(*groups, by=None, paired=False, level=0.05, seed=1):
+    """Do groups of features have one mean, and one dispersion?
+
+    Parameters
+    ----------
+    *groups : arrays of features of one type, each of shape (n,)
+    by : array_like, shape (n,), optional
+        Labels of the features of a single array, which makes groups of them in the order in which labels come.
+    paired : bool
+        Element i of both groups belongs together.
+    level : float
+        Of the verdict.
+    seed : int
+        Of permutations and of the bootstrap.
+
+    Returns
+    -------
+    Result
+        The fields of ``liestat compare --json`` (docs/comparing_groups.md): `status`, `means`, `means_if_alike`,
+        `dispersions`, `groups`, `pairs`, `verdict`, ...
+
+    Warns
+    -----
+    UserWarning
+        Where the status is not ok.
+    """
+    groups = [require_manifold(x, "compare") for x in groups]
+    names = [str(i + 1) for i in range(len(groups))]
+    if by is not None:
+        labels = np.asarray(by)
+        if len(groups) != 1 or labels.shape != groups[0].shape:
+            raise ValueError("compare: by: expected one array of features and a label for each")
+        order = list(dict.fromkeys(labels.tolist()))
+        groups, names = [groups[0][labels == label] for label in order], [str(label) for label in order]
+    if len(groups) < 2 or any(type(x) is not type(groups[0]) or x.ndim != 1 for x in groups):
+        raise ValueError("compare: expected two or more arrays of one type, each of shape (n,), or one with by=labels")
+    kind = type(groups[0]).__name__
+    if kind not in _COMPARED:
+        raise TypeError(f"compare: expected one of {', '.join(_COMPARED)}, got {kind}")
+    if paired and (len(groups) != 2 or groups[0].shape != groups[1].shape):
+        raise ValueError("compare: paired: expected two arrays of one length")
+    if not 0 < level < 1:
+        raise ValueError(f"compare: level: expected a number between 0 and 1, got {level}")
+    lists = [np.ascontiguousarray(require_finite(x.params, "compare: x")) for x in groups]
+    d = _core.compare(_COMPARED[kind], lists, names, bool(paired), float(level), int(seed))
+    if d["status"] != "ok":
+        warnings.warn(f"liestat.compare: {d['verdict']}", UserWarning, stacklevel=2)
+    return Result.of("comparison of groups", d)

@@ -40,6 +40,7 @@ void bindPreintegration(py::module_& module);
 void bindHandEye(py::module_& module);
 void bindMotion(py::module_& module);
 void bindFits(py::module_& module);
+void bindComparisons(py::module_& module);
 void bindTwoView(py::module_& module);
 void bindViInit(py::module_& module);
 void bindReaders(py::module_& module);

@@ -32,6 +32,7 @@ PYBIND11_MODULE(_core, module) {
   liestat::python::bindTrajectories(module);
   liestat::python::bindConversions(module);
   liestat::python::bindFits(module);
+  liestat::python::bindComparisons(module);
   liestat::python::bindTwoView(module);
   liestat::python::bindViInit(module);
 #ifdef LIESTAT_PYTHON_READERS

@@ -200,8 +200,8 @@ TEST_F(Program, TheManualAndTheCompletionNameEveryCommand) {
   };
   const std::string manual = output("\"$0\" --man"), completion = output("\"$0\" --completion");
   for (const std::string command :
-       {"convert", "fit", "hand-eye", "mean", "merge", "motion", "preintegrate", "two-view", "vi-init", "simulate vi",
-        "simulate hand-eye", "validate split", "validate two-view", "validate vi-init"}) {
+       {"compare", "convert", "fit", "hand-eye", "mean", "merge", "motion", "preintegrate", "two-view", "vi-init",
+        "simulate vi", "simulate hand-eye", "validate split", "validate two-view", "validate vi-init"}) {
     EXPECT_NE(manual.find(".SS \"liestat " + command), std::string::npos) << command;
     EXPECT_NE(completion.find('"' + command + "\")\n"), std::string::npos) << command;
   }
