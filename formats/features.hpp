@@ -75,6 +75,9 @@ struct ReadingOptions {
   /// Names of CSV columns that are not ours, each as "ours=theirs"; or, all of them, their numbers from 1, as "ours=1".
   std::vector<std::string> columns = {};
   double largest_file = largest_text;  ///< GB of text at most, see loadText
+  /// `map:base_link`, for a bag without a topic, or with the topic /tf, takes the pose of base_link in map by the
+  /// chain of transforms between the two.
+  std::string frames = {};
 };
 
 /// The names of the formats that are known (formats/feature_formats.cpp), `auto` first.

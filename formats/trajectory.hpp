@@ -83,10 +83,7 @@ struct TrajectoryOptions {
   /// The unit of the stamps in formats that leave it open. Nothing: seconds, unless all of them lie beyond the year
   /// 5000 and are stamps since 1970 in ms, us or ns.
   std::optional<StampUnit> time_unit = {};
-  /// `map:base_link`, for a bag without a topic, or with the topic /tf, takes the pose of base_link in map by the chain of
-  /// transforms between the two.
-  std::string frames = {};
-  ReadingOptions reading = {};  ///< norms, CSV columns, size; its format is not used
+  ReadingOptions reading = {};  ///< norms, CSV columns, size, frames of a bag; its format is not used
 };
 
 /// The names of the formats, `auto` first. Some are only read: matrix, colmap, g2o and toro (their vertices), bag.

@@ -21,6 +21,7 @@
 #include <fusion/detail/compiled.hpp>
 #include <fusion/convention_diagnosis_types.hpp>
 #include <fusion/evaluate_types.hpp>
+#include <fusion/pose_stream.hpp>
 
 #include <cstddef>
 #include <optional>
@@ -63,6 +64,8 @@ struct DiagnosedRun {
   std::vector<DiagnosedPose> poses;
   std::vector<double> times = {};       ///< s; empty: the numbers of the rows
   std::vector<std::string> notes = {};  ///< remarks on its file, in sentences
+  PoseStream truth = {};                ///< the truth by itself, where there are times: tells faults of the clock
+  double offset = 0;                    ///< s, added to the times before they were compared with the truth's
 };
 
 /// A run and the truth at its times. If `status` is not ok, `reason` says why there is none.
@@ -87,12 +90,14 @@ struct CovarianceDiagnosisOptions {
   std::optional<CovarianceOrder> order = {};        ///< that the format fixes
   std::optional<CovarianceContent> content = {};    ///< that the format fixes
   bool edges = false;                               ///< the poses are edges of a graph, independent of each other
+  bool misfit = false;                              ///< of one run: looks for faults of the whole run (findMisfit)
   bool all_units = false;                           ///< a plan has half and double angles and degrees as well
   std::optional<double> at = {};  ///< s, of several runs: the time of their residuals; the last common one if unset
 };
 
 /// The diagnosis of a file. Several runs give one residual each, at one time: those are independent of each other,
-/// while neighbouring errors of one run may not be; they are not aligned. No run, or runs without poses: nothing is
+/// while neighbouring errors of one run may not be; they are not aligned. A misfit stands before all else: what it
+/// explains is no noise, so that no convention is judged by it. No run, or runs without poses: nothing is
 /// decided.
 LIESTAT_TRAJECTORIES_API CovarianceDiagnosis diagnoseCovariances(std::span<const DiagnosedRun> runs,
                                                                  const CovarianceDiagnosisOptions& options = {});

@@ -4,6 +4,7 @@
 
 #include <fusion/detail/compiled.hpp>
 #include <fusion/trajectories_types.hpp>
+#include <fusion/trajectory_misfit_types.hpp>
 #include <stats/convention_presets.hpp>
 #include <stats/conventions.hpp>
 #include <stats/shown.hpp>
@@ -176,6 +177,7 @@ struct CovarianceDiagnosis {
   std::optional<ConventionDiagnosis> diagnosis;  ///< set in mode diagnosis
   std::optional<ChainDiagnosis> chain;           ///< set in mode chain
   std::vector<PlanRow> plan;                     ///< set in mode plan
+  MisfitSearch misfit = {};                      ///< faults of the whole run, where they were asked for
 
   /// The conventions that are left; empty for a plan.
   std::vector<Convention> accepted() const;
@@ -183,7 +185,7 @@ struct CovarianceDiagnosis {
   std::optional<Convention> best() const;
   /// Yes: one convention is identified, and the errors are consistent with it (of a plan: always). No: the errors do
   /// not follow the covariances, or no convention explains them. None: several conventions do, or there are too few
-  /// poses.
+  /// poses. A misfit of the run stands first in its text, and an identified convention is then undecided.
   Verdict verdict() const;
 };
 
@@ -278,6 +280,7 @@ void describe(V& v, const CovarianceDiagnosis& d) {
                                                       "the matrices belong to: poses, edges, or runs at a time");
   v("n", d.structure.n, "matrices")("structure", d.structure.words(), "the looks of the matrices");
   v("indefinite", d.structure.indefinite, "matrices that are not positive definite");
+  if (shown(v, d.misfit.searched)) v("misfit", d.misfit, "faults of the whole run that are no noise");
   if (shown(v, d.chain.has_value())) v("chain", d.chain.value_or(ChainDiagnosis{}), "whether it is dead reckoning");
   if (shown(v, d.diagnosis.has_value())) describe(v, d.diagnosis.value_or(ConventionDiagnosis{}));
   if (shown(v, d.mode == DiagnosisMode::plan)) v("plan", d.plan, "with --plan: a row for each convention");

@@ -32,6 +32,7 @@ enum class Misfit {
   rotation_axes,       ///< the axes of the rotations alone are
   mirrored,            ///< the axes of world and body are mirrored: a left-handed frame
   mirrored_positions,  ///< the axes of the positions alone are
+  time_scale,          ///< its times are in another unit, or run at another speed
 };
 constexpr auto words(Misfit) {
   return std::array{"clock",
@@ -49,7 +50,8 @@ constexpr auto words(Misfit) {
                     "position_axes",
                     "rotation_axes",
                     "mirrored",
-                    "mirrored_positions"};
+                    "mirrored_positions",
+                    "time_scale"};
 }
 
 /// Faults that together explain errors. A pose (R̂, p̂) of the estimate, read anew as its faults ask for, belongs to the
@@ -58,6 +60,7 @@ struct MisfitExplanation {
   std::vector<Misfit> faults = {};
   double delay = 0, delay_sigma = 0;  ///< s, to be added to the estimate's times
   double offset = 0;                  ///< s, the delay and the offset that was added before
+  double time_factor = 1;             ///< of the estimate's times, where their unit or speed is another one
   double scale = 1, scale_sigma = 0;
   SE3d body = {}, world = {};
   Eigen::Matrix3d rotation_axes_left = Eigen::Matrix3d::Identity(), rotation_axes_right = rotation_axes_left,
@@ -91,6 +94,7 @@ void describe(V& v, const MisfitExplanation& e) {
   v("faults", faults, "that hold together")("text", e.text(), "in words, with what undoes them");
   v("explained", e.explained, "share of the squared errors");
   v("delay", e.delay, "to be added to the estimate's times", "s")("delay_sigma", e.delay_sigma, "its sd", "s");
+  v("time_factor", e.time_factor, "of the estimate's times");
   v("scale", e.scale, "of the estimate's positions")("scale_sigma", e.scale_sigma, "its sd");
   v("body_translation", Eigen::Vector3d(e.body.translation()), "estimate's body to the reference's", "m");
   v("body_quaternion_xyzw", Eigen::Vector4d(e.body.so3().params()), "likewise");

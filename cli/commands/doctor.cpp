@@ -27,7 +27,7 @@ struct DoctorOptions {
   std::string json, report;
   std::optional<AlignmentModel> align;
   TrajectoryInputOptions input;
-  bool no_truth = false, plan = false, everything = false;
+  bool no_truth = false, plan = false, everything = false, misfit = false;
   std::optional<double> at;
   double alpha = 1e-3;
 };
@@ -78,7 +78,7 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
   DiagnosisOutput output;
   CovarianceDiagnosisOptions options;
   options.mode = o.plan ? DiagnosisMode::plan : o.no_truth ? DiagnosisMode::chain : DiagnosisMode::diagnosis;
-  options.alpha = o.alpha, options.all_units = o.everything, options.at = o.at;
+  options.alpha = o.alpha, options.all_units = o.everything, options.at = o.at, options.misfit = o.misfit;
   options.alignment = o.align.value_or(options.alignment);
   const bool has_truth = options.mode == DiagnosisMode::diagnosis;
   std::vector<std::string> estimates = o.files;
@@ -194,6 +194,7 @@ void addDoctorCommand(const CommandList& program) {
   command.flag("--plan", o->plan, "What the file can decide and with how many poses, before any error is seen")
       .excludes(no_truth);
   command.flag("--all-units", o->everything, "With --plan: hypotheses with half and double angles and degrees too");
+  command.flag("--misfit", o->misfit, "Of one run: look first for faults that are no noise, as evaluate --misfit does");
   command.option("--at", o->at, "With several runs: the time of their residuals, s (default: the last common one)");
   command.option("--alpha", o->alpha, "Probability of rejecting the true convention (default 0.001)").range(1e-12, 0.5);
   command.option("--json", o->json, "Write the result to a JSON file ('-': standard output)");

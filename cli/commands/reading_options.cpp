@@ -22,6 +22,8 @@ void declareReading(const Command& command, ReadingOptions& reading) {
       .range(0.0, 0.5);
   command.option("--largest-file", reading.largest_file, "Largest text that is read, expanded, GB (default 1)")
       .positive();
+  command.option("--frames", reading.frames,
+                 "Of bags without a topic: map:base_link, the pose of base_link in map by /tf and /tf_static");
 }
 
 void declareReading(const Command& command, TrajectoryOptions& reading, std::optional<DuplicateRule>& duplicates) {
@@ -38,8 +40,6 @@ void declareReading(const Command& command, TrajectoryOptions& reading, std::opt
       .option("--unmeasured-above", reading.unmeasured,
               "Variances in messages from which on a component is not measured (default 90000)")
       .positive();
-  command.option("--frames", reading.frames,
-                 "Of bags without a topic: map:base_link, the pose of base_link in map by /tf and /tf_static");
   command.choice("--time-unit", reading.time_unit,
                  "Unit of stamps that are no seconds (default s; stamps since 1970 are recognised)");
   command.choice("--duplicates", duplicates,

@@ -2,7 +2,6 @@
 
 #include <formats/input_error.hpp>
 #include <formats/text.hpp>
-#include <stats/quantile.hpp>
 
 #include <fmt/format.h>
 
@@ -42,7 +41,7 @@ void TrajectoryInputOptions::declare(const Command& command) {
 void TrajectoryInputOptions::settle() {
   std::vector<std::string> columns = std::move(reference.reading.columns);
   reference.reading = estimate.reading, reference.reading.columns = std::move(columns);
-  reference.unmeasured = estimate.unmeasured, reference.frames = estimate.frames;
+  reference.unmeasured = estimate.unmeasured;
   for (const double value : {association.offset, association.start.value_or(0), association.end.value_or(0)}) {
     if (!std::isfinite(value)) throw OptionError("liestat", "a time that is not finite", "seconds");
   }
@@ -70,23 +69,6 @@ void requireSameVertices(const Trajectory& reference, const Trajectory& estimate
                    "the same vertices in both graphs");
 }
 
-namespace {
-
-/// A way out where the stamps of two files have steps that differ by powers of 1000; empty otherwise.
-std::string hintAtUnits(const Trajectory& reference, const Trajectory& estimate) {
-  if (reference.times.size() < 3 || estimate.times.size() < 3) return {};
-  const double a = medianStep(reference.times), b = medianStep(estimate.times);
-  const bool of_estimate = b > a;
-  const double ratio = of_estimate ? b / a : a / b;
-  const auto power = static_cast<int>(std::lround(std::log10(ratio) / 3));
-  if (!std::isfinite(ratio) || power < 1 || power > 3) return {};
-  return fmt::format(", or {} {}: the step is {:.3g} s in the median in {} and {:.3g} s in {}",
-                     of_estimate ? "--time-unit" : "--ref-time-unit", name(static_cast<StampUnit>(power)), a,
-                     reference.name, b, estimate.name);
-}
-
-}  // namespace
-
 void refuse(EvaluationStatus status, const std::string& reason, const Trajectory& reference, const Trajectory& estimate,
             const TrajectoryInputOptions& options) {
   const AssociationOptions& times = options.association;
@@ -103,15 +85,13 @@ void refuse(EvaluationStatus status, const std::string& reason, const Trajectory
       throw InputError(reference.name, 0, "no pose between --t_start and --t_end",
                        fmt::format("times from {} to {} s", reference.time_texts.front(), reference.time_texts.back()));
     case EvaluationStatus::no_overlap:
-      throw InputError(estimate.name, 0, reason,
-                       "times of one clock, or --t_offset" + hintAtUnits(reference, estimate));
+      throw InputError(estimate.name, 0, reason, "times of one clock, or --t_offset");
     case EvaluationStatus::no_match:
       throw InputError(estimate.name, 0, reason,
-                       (times.rule == AssociationRule::nearest ? "a larger --t_max_diff, or --association interpolate"
-                                                               : "a larger --max-gap") +
-                           hintAtUnits(reference, estimate));
+                       times.rule == AssociationRule::nearest ? "a larger --t_max_diff, or --association interpolate"
+                                                              : "a larger --max-gap");
     case EvaluationStatus::too_few:
-      throw InputError(estimate.name, 0, reason, "at least two" + hintAtUnits(reference, estimate));
+      throw InputError(estimate.name, 0, reason, "at least two");
     case EvaluationStatus::not_aligned:
       throw InputError(estimate.name, 0, reason, "another --alignment");
     default:

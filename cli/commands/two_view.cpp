@@ -1,17 +1,22 @@
 #include <cli/commands/commands.hpp>
 #include <formats/calibration.hpp>
 #include <cli/commands/camera.hpp>
+#include <formats/colmap.hpp>
 #include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
 #include <formats/tracks.hpp>
 #include <report/publish.hpp>
+#include <cli/show/progress.hpp>
 #include <cli/show/two_view.hpp>
 #include <fusion/two_view/two_view.hpp>
 
 #include <fmt/format.h>
 
 #include <cstddef>
+#include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,7 +26,7 @@ namespace {
 constexpr const char* command_name = "liestat two-view";
 
 struct Options {
-  std::string file, json, report;
+  std::string file, json, report, colmap, output;
   std::vector<std::string> calibration;
   std::vector<double> intrinsics, second_intrinsics, image_size, verticals;
   std::vector<std::string> nodes;
@@ -67,7 +72,61 @@ int runSeveral(const Options& options, const TwoViewMotionOptions& estimate, Two
   return output.motions.verdict().isNo() ? exit_not_trusted : exit_fine;
 }
 
+/// The motion of a pair of COLMAP in its pixels.
+TwoViewMotionEstimate estimatePair(const ColmapMatches& pair, TwoViewMotionOptions estimate) {
+  if (!pair.fault.empty()) return {};
+  estimate.first = pair.first_camera, estimate.second = pair.second_camera;
+  if (estimate.first) return estimateTwoViewMotion(pair.matches, estimate);
+  // The models without cameras take both images for equally large: their centres are what counts.
+  estimate.image_size = pair.first_size.cwiseMax(pair.second_size);
+  const Eigen::Vector2d a = 0.5 * (*estimate.image_size - pair.first_size),
+                        b = 0.5 * (*estimate.image_size - pair.second_size);
+  std::vector<Eigen::Vector4d> centred = pair.matches;
+  for (Eigen::Vector4d& m : centred) m.head<2>() += a, m.tail<2>() += b;
+  TwoViewMotionEstimate found = estimateTwoViewMotion(centred, estimate);
+  Eigen::Matrix3d first = Eigen::Matrix3d::Identity(), second = first;
+  first.topRightCorner<2, 1>() = a, second.topRightCorner<2, 1>() = b;
+  found.matrix = (found.equations == 1 ? second.transpose() : Eigen::Matrix3d(second.inverse())) * found.matrix * first;
+  return found;
+}
+
+int runColmap(const Options& options, const Invocation& invocation) {
+  if (options.output.empty()) {
+    throw OptionError(command_name, "--colmap without --output", "--output COPY.db, where there is no file yet");
+  }
+  for (const auto& [given, option] :
+       {std::pair(!options.file.empty(), "a file of matches"),
+        {options.motions > 1, "--motions"},
+        {!options.intrinsics.empty() || !options.calibration.empty(), "cameras (the database has them)"},
+        {!options.image_size.empty(), "--image-size"},
+        {!options.verticals.empty(), "--verticals"},
+        {!options.report.empty(), "--report"}}) {
+    if (given) throw OptionError(command_name, fmt::format("--colmap and {}", option), "one of them");
+  }
+  TwoViewMotionOptions estimate = options.estimate;
+  for (const std::string& node : options.nodes) estimate.nodes.push_back(node_names.at(node));
+  ColmapOutput output{options.colmap, estimate.sigma, {}, {}};
+  std::optional<Progress> progress;
+  forEachColmapPair(
+      options.colmap, [&](std::size_t pairs) { progress.emplace("two-view", pairs); },
+      [&](ColmapMatches&& pair) {
+        output.pairs.push_back(colmapPairOf(pair, estimatePair(pair, estimate)));
+        progress->advance();
+      });
+  progress.reset();
+  writeColmapPairs(options.colmap, options.output, output.pairs);
+  const std::string stem = std::filesystem::path(options.output).replace_extension().string();
+  writeOutput(stem + ".g2o", formatColmapGraph(output.pairs));
+  writeOutput(stem + ".csv", formatColmapEdges(output.pairs));
+  output.files = {options.output, stem + ".g2o", stem + ".csv"};
+  publishResult(options.json, formatColmapPairs(output), invocation.command_line, estimate.search.seed, output);
+  return output.written() == 0 ? exit_not_trusted : exit_fine;
+}
+
 int runCommand(const Options& options, const Invocation& invocation) {
+  if (!options.colmap.empty()) return runColmap(options, invocation);
+  if (options.file.empty()) throw OptionError(command_name, "nothing to read", "FILE, or --colmap DATABASE");
+  if (!options.output.empty()) throw OptionError(command_name, "--output without --colmap", "--json or --report");
   TwoViewMotionOutput output;
   output.file = options.file;
   output.matches = readMatches(options.file);
@@ -86,7 +145,11 @@ void addTwoViewCommand(const CommandList& program) {
   auto options = std::make_shared<Options>();
   const Command command =
       program.add("two-view", "How the camera moved between two images, from matches of which some may be wrong");
-  command.option("file", options->file, "CSV with the columns x1,y1,x2,y2 (px); '-' is standard input").required();
+  command.option("file", options->file, "CSV with the columns x1,y1,x2,y2 (px); '-' is standard input");
+  command.option("--colmap", options->colmap,
+                 "Database of COLMAP in place of a file: all its pairs with matches (needs SQLite)");
+  command.option("--output", options->output,
+                 "With --colmap: the copy of the database that has the geometries; beside it edges as .g2o and .csv");
   command.option("--intrinsics", options->intrinsics, "fu,fv,cu,cv of the camera, px (default: not known)").list(4, 4);
   command.option("--second-intrinsics", options->second_intrinsics, "The same of the second image's (default: equal)")
       .list(4, 4);

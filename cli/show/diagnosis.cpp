@@ -26,7 +26,7 @@ std::string nameOf(const ConventionReading& reading) { return optionOf(reading.c
 std::string acceptedInWords(const CovarianceDiagnosis& r) {
   constexpr std::size_t most = 12;
   std::string text;
-  if (r.verdict().isNo()) return text;
+  if (r.verdict().isNo() || r.misfit.found()) return text;
   const std::vector<Convention> accepted = r.accepted();
   for (std::size_t k = 0; k < std::min(most, accepted.size()); ++k) {
     text += fmt::format("  --cov-from {}: {}\n", optionOf(accepted[k]), describe(accepted[k]));

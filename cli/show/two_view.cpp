@@ -340,4 +340,34 @@ void writeTwoViewMotionsReport(const std::string& directory, const std::string& 
   printLines("\n" + report.write() + "\n");
 }
 
+std::string formatColmapPairs(const ColmapOutput& output) {
+  constexpr std::size_t most = 40;
+  std::string text = fmt::format(
+      "{} pairs with matches of {}, noise {:g} px; pixels are COLMAP's, (0.5, 0.5) is the centre of the first\n\n",
+      output.pairs.size(), output.database, output.sigma);
+  struct Group {
+    std::size_t pairs = 0, matches = 0, inliers = 0, edges = 0;
+  };
+  std::map<std::pair<std::string, std::string>, Group> groups;
+  std::string refused;
+  std::size_t n_refused = 0;
+  for (const ColmapPair& p : output.pairs) {
+    Group& g = groups[{p.isWritten() ? name(p.config) : "not written", p.isWritten() ? p.model : p.status}];
+    ++g.pairs, g.matches += p.matches, g.inliers += p.inliers, g.edges += p.edge.has_value();
+    if (p.isWritten() || ++n_refused > most) continue;
+    refused += fmt::format("  {} - {}: {}{}\n", printable(p.first_name), printable(p.second_name), p.status,
+                           p.reason.empty() ? "" : ": " + p.reason);
+  }
+  Table table({"configuration", "model", "pairs", "matches", "inliers", "edges"});
+  for (const auto& [names, g] : groups) {
+    table.row({names.first, names.second, cell(g.pairs), cell(g.matches), cell(g.inliers), cell(g.edges)});
+  }
+  text += table.str();
+  if (!refused.empty()) text += "\nnot written, because they are not to be trusted:\n" + refused;
+  if (n_refused > most) text += fmt::format("  and {} more (--json has all)\n", n_refused - most);
+  for (const std::string& file : output.files)
+    text += (&file == &output.files[0] ? "\nwritten: " : "written: ") + file + "\n";
+  return text;
+}
+
 }  // namespace liestat::cli

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <formats/colmap.hpp>
 #include <fusion/two_view/two_view_types.hpp>
 
 #include <Eigen/Core>
 
+#include <algorithm>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -32,6 +35,27 @@ void describe(V& v, const TwoViewMotionsOutput& output) {
   v("file", output.file);
   describe(v, output.motions);
 }
+
+/// The pairs of a database of COLMAP.
+struct ColmapOutput {
+  std::string database;
+  double sigma = 1;  ///< px
+  std::vector<ColmapPair> pairs;
+  std::vector<std::string> files;
+
+  std::size_t written() const {
+    return static_cast<std::size_t>(
+        std::count_if(pairs.begin(), pairs.end(), [](const ColmapPair& p) { return p.isWritten(); }));
+  }
+};
+template <class V>
+void describe(V& v, const ColmapOutput& output) {
+  v("database", output.database)("sigma", output.sigma, "of each coordinate", "px");
+  v("pairs", output.pairs, "with matches")("written", output.written(), "pairs in the copy")("files", output.files);
+}
+
+/// The pairs by their configurations, and those that are not written with the reason.
+std::string formatColmapPairs(const ColmapOutput& output);
 
 /// The chosen model, its parameters and the lattice, for the terminal.
 std::string formatTwoViewMotion(const TwoViewMotionOutput& output);

@@ -16,7 +16,7 @@
 #include <zstd.h>
 #endif
 #ifdef LIESTAT_HAS_SQLITE_LIBRARY
-#include <sqlite3.h>
+#include <formats/detail/sqlite_file.hpp>
 #endif
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -496,121 +496,62 @@ namespace {
 // --- SQLite -----------------------------------------------------------------------------------------------------------
 
 #ifdef LIESTAT_HAS_SQLITE_LIBRARY
-/// A database that is only read, and whose tables are to be tables: a view may run for ever.
-class Rosbag2 {
- public:
-  Rosbag2(const std::string& path, std::string name) : name_(std::move(name)) {
-    std::string uri = "file:";
-    for (const char c : path) {
-      if (c == '?' || c == '#' || c == '%') {
-        uri += fmt::format("%{:02X}", static_cast<unsigned>(c));
-      } else {
-        uri += c;
+/// The tables of rosbag2.
+void readRosbag2(const SqliteFile& file, BagPass& pass) {
+  std::string message;
+  const auto each = [&](const char* sql, sqlite3_int64 parameter, auto&& row) {
+    const bool whole = file.each(sql, parameter, row);
+    if (!whole) message = file.message();
+    return whole;
+  };
+  if (!file.hasTables("'topics','messages'", 2)) {
+    const bool damaged = !file.each("SELECT count(*) FROM sqlite_schema", 0, [](sqlite3_stmt*) {});
+    throw InputError(file.name(), 0, damaged ? file.message() : "it has no tables 'topics' and 'messages'",
+                     "a bag of ROS 2");
+  }
+  std::map<sqlite3_int64, std::size_t> topics;
+  bool whole = each("SELECT id, name, type, serialization_format FROM topics", 0, [&](sqlite3_stmt* s) {
+    topics[sqlite3_column_int64(s, 0)] =
+        pass.topic(SqliteFile::text(s, 1), rosType(SqliteFile::text(s, 2)), SqliteFile::text(s, 3));
+  });
+  std::size_t unread = 0;
+  if (pass.counts()) {
+    whole = each("SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages GROUP BY topic_id", 0,
+                 [&](sqlite3_stmt* s) {
+                   const auto topic = topics.find(sqlite3_column_int64(s, 0));
+                   if (topic == topics.end()) return;
+                   pass.count(topic->second, static_cast<std::size_t>(sqlite3_column_int64(s, 1)),
+                              sqlite3_column_int64(s, 2), sqlite3_column_int64(s, 3));
+                 }) &&
+            whole;
+  }
+  for (const auto& entry : topics) {
+    const std::size_t topic = entry.second;
+    if (pass.counts() || !pass.takes(topic)) continue;
+    const bool read = each("SELECT timestamp, data FROM messages WHERE topic_id=?", entry.first, [&](sqlite3_stmt* s) {
+      std::string_view bytes = SqliteFile::blob(s, 1);
+      Expanded e;
+      if (bytes.starts_with(zstd_magic)) {
+        e = expanded("zstd", bytes, largest_message, file.name());
+        bytes = e.text;
       }
-    }
-    std::error_code ignored;
-    // Where a writer left no log behind, nothing need be written beside a file to read it.
-    const bool log = std::filesystem::file_size(path + "-wal", ignored) > 0 && !ignored;
-    uri += log ? "?mode=ro" : "?mode=ro&immutable=1";
-    const int result = sqlite3_open_v2(uri.c_str(), &database_, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
-    if (result != SQLITE_OK) {
-      const std::string why = message();
-      sqlite3_close(database_);
-      throw InputError(name_, 0, "SQLite: " + why, "a bag");
-    }
-    sqlite3_limit(database_, SQLITE_LIMIT_LENGTH, static_cast<int>(largest_chunk));
-    sqlite3_exec(database_, "PRAGMA trusted_schema=OFF; PRAGMA cell_size_check=ON", nullptr, nullptr, nullptr);
-  }
-  ~Rosbag2() { sqlite3_close(database_); }
-  Rosbag2(const Rosbag2&) = delete;
-  Rosbag2& operator=(const Rosbag2&) = delete;
-
-  /// Calls a function with each row; false, with a message, if the rows end with an error.
-  template <class Row>
-  bool each(const char* sql, sqlite3_int64 parameter, Row&& row) {
-    sqlite3_stmt* s = nullptr;
-    if (sqlite3_prepare_v2(database_, sql, -1, &s, nullptr) != SQLITE_OK) return false;
-    const std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_finalize)> ends(s, &sqlite3_finalize);
-    sqlite3_bind_int64(s, 1, parameter);
-    int result = 0;
-    while ((result = sqlite3_step(s)) == SQLITE_ROW) row(s);
-    if (result != SQLITE_DONE) message_ = message();
-    return result == SQLITE_DONE;
-  }
-
-  void read(std::uint64_t bytes, BagPass& pass) {
-    int tables = 0, others = 0;
-    each(
-        "SELECT count(*) FROM sqlite_schema WHERE type='table' AND name IN ('topics','messages') AND sql LIKE "
-        "'create table%'",
-        0, [&](sqlite3_stmt* s) { tables = sqlite3_column_int(s, 0); });
-    each(
-        "SELECT (SELECT count(*) FROM pragma_table_xinfo('messages') WHERE hidden<>0) + (SELECT count(*) FROM "
-        "pragma_table_xinfo('topics') WHERE hidden<>0)",
-        0, [&](sqlite3_stmt* s) { others = sqlite3_column_int(s, 0); });
-    if (tables != 2 || others != 0) {
-      throw InputError(name_, 0, message_.empty() ? "it has no tables 'topics' and 'messages'" : message_,
-                       "a bag of ROS 2");
-    }
-    std::map<sqlite3_int64, std::size_t> topics;
-    bool whole = each("SELECT id, name, type, serialization_format FROM topics", 0, [&](sqlite3_stmt* s) {
-      topics[sqlite3_column_int64(s, 0)] = pass.topic(text(s, 1), rosType(text(s, 2)), text(s, 3));
+      if (bytes.size() > largest_message || !e.fault.empty()) {
+        ++unread;
+      } else {
+        pass.take(pass.topics[topic], sqlite3_column_int64(s, 0), bytes);
+      }
     });
-    // A row takes more bytes than this, so that a table which leads back into itself has an end.
-    const std::uint64_t most = bytes / 4;
-    std::uint64_t rows = 0;
-    std::size_t unread = 0;
-    if (pass.counts()) {
-      whole = each("SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages GROUP BY topic_id", 0,
-                   [&](sqlite3_stmt* s) {
-                     const auto topic = topics.find(sqlite3_column_int64(s, 0));
-                     if (topic == topics.end()) return;
-                     pass.count(topic->second, static_cast<std::size_t>(sqlite3_column_int64(s, 1)),
-                                sqlite3_column_int64(s, 2), sqlite3_column_int64(s, 3));
-                   }) &&
-              whole;
-    }
-    for (const auto& entry : topics) {
-      const std::size_t topic = entry.second;
-      if (pass.counts() || !pass.takes(topic)) continue;
-      const bool read =
-          each("SELECT timestamp, data FROM messages WHERE topic_id=?", entry.first, [&](sqlite3_stmt* s) {
-            if (++rows > most) throw InputError(name_, 0, "its table of messages leads back into itself");
-            const void* data = sqlite3_column_blob(s, 1);
-            std::string_view message(static_cast<const char*>(data),
-                                     static_cast<std::size_t>(sqlite3_column_bytes(s, 1)));
-            Expanded e;
-            if (message.starts_with(zstd_magic)) {
-              e = expanded("zstd", message, largest_message, name_);
-              message = e.text;
-            }
-            if (message.size() > largest_message || !e.fault.empty()) {
-              ++unread;
-            } else {
-              pass.take(pass.topics[topic], sqlite3_column_int64(s, 0), message);
-            }
-          });
-      whole = whole && read;
-    }
-    if (!whole) {
-      pass.notes.push_back(fmt::format("{} is damaged ({}): what can be read is read", name_, printable(message_, 80)));
-    }
-    if (unread > 0) {
-      pass.notes.push_back(fmt::format("{}: {} messages are damaged or of more than {} bytes: passed over", name_,
-                                       unread, largest_message));
-    }
+    whole = whole && read;
   }
-
- private:
-  static std::string text(sqlite3_stmt* s, int column) {
-    const auto* t = reinterpret_cast<const char*>(sqlite3_column_text(s, column));
-    return t == nullptr ? "" : t;
+  if (!whole) {
+    pass.notes.push_back(
+        fmt::format("{} is damaged ({}): what can be read is read", file.name(), printable(message, 80)));
   }
-  std::string message() const { return database_ == nullptr ? "no memory" : sqlite3_errmsg(database_); }
-
-  sqlite3* database_ = nullptr;
-  std::string name_, message_;
-};
+  if (unread > 0) {
+    pass.notes.push_back(fmt::format("{}: {} messages are damaged or of more than {} bytes: passed over", file.name(),
+                                     unread, largest_message));
+  }
+}
 #endif
 
 void readOneFile(const std::string& path, const std::string& name, [[maybe_unused]] double largest, BagPass& pass) {
@@ -623,7 +564,7 @@ void readOneFile(const std::string& path, const std::string& name, [[maybe_unuse
     ChunkedBag<McapRecords>(McapRecords{}, name, pass).read(bytes, mcap_magic.size());
   } else if (m.starts_with(sqlite_magic)) {
 #ifdef LIESTAT_HAS_SQLITE_LIBRARY
-    Rosbag2(path, name).read(bytes.size(), pass);
+    readRosbag2(SqliteFile(path, name), pass);
 #else
     refuseCompression(name, "SQLite", "libsqlite3-dev");
 #endif

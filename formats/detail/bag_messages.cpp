@@ -19,6 +19,7 @@ constexpr std::pair<std::string_view, BagType> bag_types[] = {
     {"geometry_msgs/TransformStamped", BagType::transform},
     {"tf2_msgs/TFMessage", BagType::transforms},
     {"tf/tfMessage", BagType::transforms},
+    {"nav_msgs/Path", BagType::path},
     {"sensor_msgs/Imu", BagType::imu}};
 
 /// The fields of a message in their order. ROS 1 packs them; in CDR each number stands at a multiple of its size (of 4
@@ -120,6 +121,13 @@ std::vector<BagPose> posesOf(const BagTopic& topic, std::string_view data, const
   if (type == BagType::transforms) {
     // No list is longer than its bytes: each has two texts and seven numbers.
     for (std::uint32_t n = fields.u32(); n > 0; --n) poses.push_back(fields.pose(true));
+  } else if (type == BagType::path) {
+    BagPose whole;
+    fields.header(whole.stamp_ns, whole.frame);
+    for (std::uint32_t n = fields.u32(); n > 0; --n) {
+      poses.push_back(fields.pose(false));
+      if (poses.back().frame.empty()) poses.back().frame = whole.frame;
+    }
   } else {
     poses.push_back(fields.pose(type == BagType::odometry || type == BagType::transform));
     if (type == BagType::odometry || type == BagType::pose_with_covariance) {

@@ -14,7 +14,7 @@
 namespace liestat::detail {
 
 /// The types that are read.
-enum class BagType { pose, pose_with_covariance, odometry, transform, transforms, imu };
+enum class BagType { pose, pose_with_covariance, odometry, transform, transforms, path, imu };
 /// The type of that name; nothing if it is not read.
 std::optional<BagType> bagTypeOf(std::string_view name);
 
@@ -34,8 +34,8 @@ struct BagImu {
   Eigen::Matrix<double, 9, 1> rate_covariance, force_covariance;
 };
 
-/// The pose of a message, or the transforms of a TFMessage. Throws InputError with the file and the message's number
-/// where the bytes are not those of the type.
+/// The pose of a message, the transforms of a TFMessage or the poses of a Path, each with its own stamp. Throws
+/// InputError with the file and the message's number where the bytes are not those of the type.
 std::vector<BagPose> posesOf(const BagTopic& topic, std::string_view data, const std::string& file, std::size_t number);
 /// The same of an Imu message.
 BagImu imuOf(const BagTopic& topic, std::string_view data, const std::string& file, std::size_t number);

@@ -10,12 +10,14 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <utility>
 
 namespace liestat::detail {
 namespace {
 
-constexpr const char* pose_types = "PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped, TFMessage";
+constexpr const char* pose_types =
+    "PoseStamped, PoseWithCovarianceStamped, Odometry, Path, TransformStamped, TFMessage";
 
 bool isPoses(const BagTopic& t) {
   const std::optional<BagType> type = bagTypeOf(t.type);
@@ -65,12 +67,12 @@ SE3d transformAt(const BagEdge& edge, std::int64_t time, std::int64_t& gap) {
 }
 
 void readChain(const std::string& file, const std::string& topic, const TrajectoryOptions& options, Trajectory& t) {
-  const std::size_t colon = options.frames.find(':');
+  const std::size_t colon = options.reading.frames.find(':');
   const auto bare = [](const std::string& frame) { return frame.starts_with('/') ? frame.substr(1) : frame; };
-  const std::string to = bare(options.frames.substr(0, colon));
-  const std::string from = colon == std::string::npos ? "" : bare(options.frames.substr(colon + 1));
+  const std::string to = bare(options.reading.frames.substr(0, colon));
+  const std::string from = colon == std::string::npos ? "" : bare(options.reading.frames.substr(colon + 1));
   if (to.empty() || from.empty() || to == from) {
-    throw OptionError("--frames", "'" + printable(options.frames) + "'", "two frames: map:base_link");
+    throw OptionError("--frames", "'" + printable(options.reading.frames) + "'", "two frames: map:base_link");
   }
   BagTree tree;
   std::vector<std::string> chain;  // children of the edges that are taken; none: all, without their samples
@@ -200,10 +202,28 @@ void appendBagPose(const BagPose& p, std::int64_t recorded, std::size_t number, 
   appendCovariance(t, {}, numbers, number);
 }
 
+/// Appends the poses of the last of so many messages; without times where their stamps do not ascend, as those of a
+/// plan.
+void appendPath(const std::vector<BagPose>& poses, std::size_t messages, const TrajectoryOptions& options,
+                Trajectory& t) {
+  bool timed = true;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    timed = timed && poses[i].stamp_ns > (i > 0 ? poses[i - 1].stamp_ns : 0);
+    std::size_t unstamped = 0;
+    appendBagPose(poses[i], 0, i + 1, options, unstamped, t);
+  }
+  if (!timed) t.times.clear(), t.time_texts = {};
+  t.notes.push_back(fmt::format("the poses are those of the last of {} messages{}", messages,
+                                timed ? "" : "; their stamps do not ascend, so that they have no times"));
+}
+
 void readPoseTopic(const std::string& file, const std::string& topic, const TrajectoryOptions& options, Trajectory& t) {
   BagPass pass;
   bool found = false;
   std::size_t number = 0, unstamped = 0;
+  // A path grows from message to message, so that the last one is all of it.
+  std::optional<BagTopic> path_topic;
+  std::string path;
   pass.wanted = [&](const BagTopic& b) {
     if (b.name != topic) return false;
     if (isTransforms(b)) throw InputError(t.name, 0, "transforms of many frames", "--frames map:base_link with two");
@@ -215,11 +235,16 @@ void readPoseTopic(const std::string& file, const std::string& topic, const Traj
   };
   pass.take = [&](const BagTopic& b, std::int64_t recorded, std::string_view data) {
     ++number;
+    if (bagTypeOf(b.type) == BagType::path) {
+      path_topic = b, path = data;
+      return;
+    }
     appendBagPose(posesOf(b, data, t.name, number).front(), recorded, number, options, unstamped, t);
   };
   readBagFile(file, options.reading.largest_file, pass);
   if (!found) requireBagTopic(t.name, topic, pass.topics);
   t.notes = pass.notes;
+  if (path_topic) appendPath(posesOf(*path_topic, path, t.name, number), number, options, t);
   if (unstamped > 0) t.notes.push_back(fmt::format("{} messages have no stamp: when they were recorded", unstamped));
   const auto unknown = [](const Matrix6d& C) { return C.array().isNaN().all(); };
   if (std::all_of(t.covariances.begin(), t.covariances.end(), unknown)) {
@@ -246,7 +271,7 @@ Trajectory readBagTrajectory(const std::string& path, const TrajectoryOptions& o
   auto [file, topic] = bagPath(path);
   Trajectory t;
   t.name = sourceName(path), t.format = "bag", t.stamp_decimals = 9;
-  if (!options.frames.empty() && (topic.empty() || topic.ends_with("/tf"))) {
+  if (!options.reading.frames.empty() && (topic.empty() || topic.ends_with("/tf"))) {
     readChain(file, topic.empty() ? "/tf" : topic, options, t);
     return t;
   }
@@ -267,7 +292,7 @@ Trajectory readBagTrajectory(const std::string& path, const TrajectoryOptions& o
     topic = chosen, t.name += ":" + chosen;
   }
   readPoseTopic(file, topic, options, t);
-  if (t.poses.empty()) throw InputError(t.name, 0, "the topic has no messages", "at least one");
+  if (t.poses.empty()) throw InputError(t.name, 0, "the topic has no messages, or its path no poses", "at least one");
   if (!chosen.empty()) t.notes.push_back("the poses are those of " + chosen);
   return t;
 }

@@ -4,3 +4,4 @@
 #endif
 
 #include <fusion/trajectories/detail/find_misfit.hpp>
+#include <fusion/trajectories/detail/misfit_times.hpp>

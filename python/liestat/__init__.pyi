@@ -625,6 +625,7 @@ class _MisfitExplanation(Result):
     explained: float  # share of the squared errors
     delay: float  # to be added to the estimate's times; s
     delay_sigma: float  # its sd; s
+    time_factor: float  # of the estimate's times
     scale: float  # of the estimate's positions
     scale_sigma: float  # its sd
     body_translation: _Array  # estimate's body to the reference's; m
@@ -779,6 +780,7 @@ class _CovarianceDiagnosis(Result):
     n: int  # matrices
     structure: list[str]  # the looks of the matrices
     indefinite: int  # matrices that are not positive definite
+    misfit: _MisfitSearch  # faults of the whole run that are no noise
     chain: _ChainDiagnosis  # whether it is dead reckoning
     verdict: str  # identified, undecidable, inconsistent or none
     reason: str  # in words
@@ -1683,6 +1685,7 @@ def diagnose_conventions(
     order: Literal["tr", "rt"] | None = None,
     content: Literal["covariance", "information", "sigmas"] | None = None,
     edges: bool = False,
+    misfit: bool = False,
     association: Literal["interpolate", "nearest"] = "interpolate",
     interpolation: Literal["cubic", "geodesic", "slerp"] = "cubic",
     max_gap: float | None = None,

@@ -316,6 +316,7 @@ def diagnose_conventions(
     order=None,
     content=None,
     edges=False,
+    misfit=False,
     association="interpolate",
     interpolation="cubic",
     max_gap=None,
@@ -351,6 +352,8 @@ def diagnose_conventions(
         The content that the format fixes; information for edges.
     edges : bool
         The poses are edges of a graph, and the truth their true relative poses.
+    misfit : bool
+        Of one run: look first for faults that are no noise, as `evaluate_trajectory` does.
     association : {'interpolate', 'nearest'}
         The truth at the times of the estimate, or its nearest stamps, at most `max_difference` (s) away.
     interpolation : {'cubic', 'geodesic', 'slerp'}
@@ -412,6 +415,7 @@ def diagnose_conventions(
         content = "information"
     at = None if at is None else float(at)
     d = _core.diagnose_conventions(
-        runs, exact, at_truth, how, mode, align, float(alpha), at, bool(all_units), order, content, bool(edges)
+        *(runs, exact, at_truth, how, mode, align, float(alpha), at, bool(all_units)),
+        *(order, content, bool(edges), bool(misfit)),
     )
     return Result.of("diagnosis", d)

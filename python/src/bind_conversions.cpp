@@ -103,7 +103,8 @@ AssociationOptions associationOf(const py::dict& given) {
 py::dict diagnose(const std::vector<GivenRun>& given, const std::optional<DoubleArray>& true_poses,
                   const std::optional<DoubleArray>& truth_times, const py::dict& association, const std::string& mode,
                   const std::string& alignment, double alpha, std::optional<double> at, bool all_units,
-                  const std::optional<std::string>& order, const std::optional<std::string>& content, bool edges) {
+                  const std::optional<std::string>& order, const std::optional<std::string>& content, bool edges,
+                  bool misfit) {
   std::optional<PoseTrajectory> truth;
   if (true_poses) truth = trajectoryOf(*true_poses, truth_times);
   const AssociationOptions how = associationOf(association);
@@ -113,7 +114,7 @@ py::dict diagnose(const std::vector<GivenRun>& given, const std::optional<Double
   options.mode = named(mode, {DiagnosisMode::diagnosis, DiagnosisMode::chain, DiagnosisMode::plan});
   options.alignment =
       named(alignment, {AlignmentModel::none, AlignmentModel::posyaw, AlignmentModel::se3, AlignmentModel::sim3});
-  options.alpha = alpha, options.at = at, options.all_units = all_units, options.edges = edges;
+  options.alpha = alpha, options.at = at, options.all_units = all_units, options.edges = edges, options.misfit = misfit;
   Convention fixed;
   if (order && setConventionField(fixed, "order", *order)) options.order = fixed.order;
   if (content && setConventionField(fixed, "content", *content)) options.content = fixed.content;

@@ -38,7 +38,7 @@ TrajectoryOptions readingOptions(const std::string& format, const std::string& c
                                  bool ignore_unknown, double norm_tolerance, const std::string& time_unit,
                                  double largest_file, const std::string& frames) {
   TrajectoryOptions options;
-  options.frames = frames;
+  options.reading.frames = frames;
   options.format = format, options.covariance_file = covariance_file, options.unmeasured = unmeasured;
   options.reading.columns = columns, options.reading.ignore_unknown = ignore_unknown;
   options.reading.norm_tolerance = norm_tolerance, options.reading.largest_file = largest_file;

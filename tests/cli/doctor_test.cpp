@@ -66,6 +66,33 @@ struct Page {
   bool has(const std::string& name) const { return std::filesystem::exists(directory / "page/" + name + ".csv"); }
 };
 
+TEST(DoctorCommand, SaysFirstWhatIsNoNoise) {
+  Files files(convention(Perturbation::world_axes));
+  const Json clean = json(files.words({"--misfit"}), 0);
+  EXPECT_EQ(clean["misfit"]["searched"], true);
+  EXPECT_EQ(clean["verdict"], "identified") << clean["sentence"];
+  // Positions 20 % too large, and errors with them.
+  for (auto& g : files.scene.estimate) g.mean = SE3d(SO3d(g.mean.so3()), Eigen::Vector3d(1.2 * g.mean.translation()));
+  files.directory.write(
+      "est.txt", tumWithCovariance(files.scene.times, files.scene.estimate, convention(Perturbation::world_axes)));
+  const ProgramOutput out = run(files.words({"--misfit", "--json", files.directory / "out.json"}));
+  EXPECT_NE(out.exit_code, 0);
+  EXPECT_EQ(out.output.find("MISFIT: explained "), 0U) << out.output;
+  EXPECT_NE(out.output.find(" % too large"), std::string::npos) << out.output;
+  EXPECT_EQ(out.output.find("--cov-from"), std::string::npos) << "nothing to copy";
+  const Json found = Json::parse(contentOf(files.directory / "out.json"));
+  EXPECT_EQ(found["misfit"]["explanations"][0]["faults"][0], "scale");
+  // A column of stamps in ms.
+  std::vector<double> ms;
+  for (const double t : files.scene.times) ms.push_back(1e3 * t);
+  files.directory.write("est.txt", tumWithCovariance(ms, files.scene.estimate, convention(Perturbation::world_axes)));
+  const std::string in_ms = "the times are in ms (--time-unit ms): the motion then agrees";
+  EXPECT_NE(run(files.words()).output.find(in_ms), std::string::npos) << "the pose at zero has a partner";
+  const ProgramOutput evaluated = run({"evaluate", files.truth, files.estimate, "--format", "tum", "--cov-layout",
+                                       "full36", "--cov-from", "ros-fixed", "--t_start", "1"});
+  EXPECT_NE(evaluated.error.find(in_ms), std::string::npos) << "none has" << evaluated.error;
+}
+
 TEST(DoctorCommand, NamesTheConvention) {
   const Files files(convention(Perturbation::world_axes));
   const Json found = json(files.words(), 0);

@@ -109,10 +109,10 @@ void expectScene(const std::string& path, int count) {
   EXPECT_TRUE(contains(features.notes[0], "covariances are not used") && features.covariances.empty());
   // map -> odom comes with each fourth pose; its height grows evenly, so that interpolation is exact.
   TrajectoryOptions chain;
-  chain.frames = "map:camera";
+  chain.reading.frames = "map:camera";
   const Trajectory t = readTrajectory(path, chain);
   ASSERT_EQ(t.size(), 4 * ((poses - 1) / 4) + 1);
-  chain.frames = "camera:map";
+  chain.reading.frames = "camera:map";
   const Trajectory inverse = readTrajectory(path + ":/tf", chain);
   for (std::size_t k = 0; k < t.size(); ++k) {
     const SE3d map_T_odom(SO3d(), Eigen::Vector3d(0, 0, 1 + 0.05 * static_cast<double>(k)));
@@ -224,11 +224,55 @@ TEST(Bag, bagsOfEveryEncoding) {
   }
 }
 
+TEST(Bag, pathsAreTheirLastMessage) {
+  const TemporaryDirectory directory;
+  const auto pathOf = [](Writer w, const std::vector<std::uint32_t>& stamps, const std::string& frame) {
+    w.header("map", 9, 0), w.number(stamps.size(), 4);
+    for (const std::uint32_t s : stamps) w.header(frame, s, 5), w.numbers({double(s), 2, 3, 0, 0, 0, 1});
+    return w.data;
+  };
+  for (const Writer::Encoding e : encodings) {
+    const Writer w{e};
+    const std::string path = directory.write(
+        "x.mcap", mcap("nav_msgs/msg/Path", w.cdr(), {pathOf(w, {1, 2}, "map"), pathOf(w, {1, 2, 4}, "")}));
+    const Trajectory t = readTrajectory(path + ":/x");
+    ASSERT_EQ(t.size(), 3U);
+    EXPECT_EQ(t.poses[2].translation(), Eigen::Vector3d(4, 2, 3));
+    EXPECT_EQ(t.time_texts[2], "4.000000005") << "its own stamp";
+    EXPECT_EQ(t.frames[0], "map") << "that of the path, where a pose has none";
+    EXPECT_TRUE(contains(t.notes.back(), "the last of 2 messages"));
+    // A plan: one stamp for all.
+    const Trajectory plan =
+        readTrajectory(directory.write("x.mcap", mcap("nav_msgs/msg/Path", w.cdr(), {pathOf(w, {7, 7, 7}, "map")})));
+    EXPECT_EQ(plan.size(), 3U);
+    EXPECT_FALSE(plan.hasTimes());
+    const std::string cut = pathOf(w, {1, 2}, "map");
+    EXPECT_TRUE(contains(errorOf([&] {
+                           readTrajectory(directory.write(
+                               "x.mcap", mcap("nav_msgs/msg/Path", w.cdr(), {cut.substr(0, cut.size() - 9)})));
+                         }),
+                         "nav_msgs/Path"));
+  }
+}
+
+TEST(Bag, framesForFeatures) {
+  const TemporaryDirectory directory;
+  const Writer w;
+  const std::string path = directory.write("x.mcap", mcap("tf2_msgs/msg/TFMessage", w.cdr(),
+                                                          {transformsOf(w, {{"map", "odom"}, {"odom", "base"}}),
+                                                           transformsOf(w, {{"map", "odom"}, {"odom", "base"}}, 2)},
+                                                          "/tf"));
+  const FeatureFile file = readFeatureFile(path, {.frames = "map:base"});
+  ASSERT_EQ(file.size(), 2U);
+  EXPECT_EQ(file.positions[1], Eigen::Vector3d(2, 0, 0));
+  EXPECT_EQ(file.times[1], 2);
+}
+
 TEST(Bag, topicsWithoutPoses) {
   const TemporaryDirectory directory;
   const auto error = [&](const std::string& content, const std::string& topic = ":/x", const std::string& frames = "") {
     TrajectoryOptions o;
-    o.frames = frames;
+    o.reading.frames = frames;
     return errorOf([&] { readTrajectory(directory.write("x.mcap", content) + topic, o); });
   };
   const std::string stamped = "geometry_msgs/msg/PoseStamped", transforms = "tf2_msgs/msg/TFMessage";
@@ -309,7 +353,7 @@ TEST(Bag, stampsOfZeroAndUnknownCovariances) {
 std::size_t readAll(const std::string& path) {
   std::size_t read = 0;
   TrajectoryOptions chain;
-  chain.frames = "map:camera";
+  chain.reading.frames = "map:camera";
   const std::function<void()> ways[] = {[&] { read += listBag(path).notes.size(); },
                                         [&] { read += readTrajectory(path + ":/odom").size(); },
                                         [&] { readTrajectory(path, chain); }, [&] { readImu(path + ":/imu"); }};

@@ -99,6 +99,44 @@ TEST(TrajectoryMisfit, CleanTrajectoriesHaveNone) {
   }
 }
 
+/// The estimate with its times divided by a factor and moved.
+PoseStream timed(const Scene& s, double factor, double zero = 0) {
+  std::vector<TimedPose> poses;
+  for (std::size_t i = 0; i < s.times.size(); ++i) poses.push_back({(s.times[i] - zero) / factor, s.estimate[i]});
+  return PoseStream(poses);
+}
+
+TEST(TrajectoryMisfit, UnitsAndSpeedsOfTimesAreNamed) {
+  const SE3d X(SO3d::exp(Eigen::Vector3d(.1, -.2, .15)), Eigen::Vector3d(.1, -.05, .2));
+  for (std::uint64_t seed = 500; seed < 508; ++seed) {
+    CounterRng rng(seed);
+    // In another world, of another frame on the body: the motion alone tells the times.
+    const Scene s = sceneOf(seed % 2 ? SceneMotion::planar : SceneMotion::space, rng, 0,
+                            [&](const SE3d& T) { return X.inverse() * T * X; });
+    EXPECT_FALSE(findTimeScale(timed(s, 1), s.stream).found());
+    for (const double unit : {1e-3, 1e-6, 1e-9, 1e3}) {
+      const MisfitSearch m = findTimeScale(timed(s, unit), s.stream);
+      ASSERT_TRUE(names(m, {Misfit::time_scale})) << seed << ' ' << unit;
+      EXPECT_DOUBLE_EQ(m.explanations[0].time_factor, unit);
+      EXPECT_NEAR(m.explanations[0].delay, 0, 0.05) << m.sentence();
+    }
+    EXPECT_NE(findTimeScale(timed(s, 1e-3), s.stream).sentence().find("(--time-unit ms)"), std::string::npos);
+    // Their own zero, at the reference's beginning.
+    Scene begun = s;
+    begun.stream = PoseStream(std::vector<TimedPose>(s.stream.poses().begin() + 15, s.stream.poses().end()));
+    EXPECT_NE(findTimeScale(timed(begun, 1e-3, 1e6), begun.stream).sentence().find("begin elsewhere"),
+              std::string::npos);
+    const MisfitSearch fast = findTimeScale(timed(s, 1.25), s.stream);
+    ASSERT_TRUE(names(fast, {Misfit::time_scale})) << seed;
+    EXPECT_NEAR(fast.explanations[0].time_factor, 1.25, 0.005) << fast.sentence();
+    // Another run is no fault of the clock.
+    CounterRng other(seed + 50);
+    const Scene stranger = sceneOf(SceneMotion::space, other);
+    const MisfitSearch m = findTimeScale(timed(stranger, 1), s.stream);
+    EXPECT_FALSE(m.found()) << m.sentence();
+  }
+}
+
 TEST(TrajectoryMisfit, FewPosesAreNotSearched) {
   CounterRng rng(1);
   Scene s = sceneOf(SceneMotion::space, rng);

@@ -6,6 +6,7 @@
 #include <fusion/evaluate.hpp>
 #include <fusion/nearest_in_time.hpp>
 #include <fusion/trajectories/detail/diagnose_conventions.hpp>
+#include <fusion/trajectories/detail/run_misfit.hpp>
 #include <fusion/trajectories/detail/ranked_conventions.hpp>
 #include <stats/words.hpp>
 
@@ -97,11 +98,22 @@ LIESTAT_FUSION_INLINE RunAgainstTruth runAgainstTruth(const PoseTrajectory& trut
   const Associated associated =
       associate({times, poses.size(), truth_name}, {estimate.times, estimate.poses.size(), estimate_name}, options);
   r.status = associated.status, r.reason = associated.reason;
-  if (!r.ok()) return r;
+  if (!r.ok()) {
+    if (detail::lacksPartners(r.status)) {
+      r.reason = detail::reasonWithTimes(r.reason, estimate.times, estimate.poses, times, poses, options.offset);
+    }
+    return r;
+  }
   const MatchedPoses matched = matchedPoses(associated.matches, poses, estimate.poses, options.interpolation, times);
   for (std::size_t k = 0; k < matched.size(); ++k) {
     r.run.poses.push_back({matched.estimate.mean(k), matched.estimate.covariance(k), matched.reference.mean(k)});
     if (!estimate.times.empty()) r.run.times.push_back(estimate.times[associated.matches[k].estimate]);
+  }
+  if (associated.by_time) r.run.truth = detail::streamOf(times, poses), r.run.offset = options.offset;
+  if (associated.by_time && detail::fewPartners(matched.size(), estimate.poses.size())) {
+    const MisfitSearch of_times =
+        findTimeScale(detail::streamOf(estimate.times, estimate.poses), r.run.truth, options.offset);
+    if (of_times.found()) r.run.notes.push_back(of_times.sentence());
   }
   const std::string suspicion = suspectQuaternionOrder(matched, truth_name, estimate_name);
   if (!suspicion.empty()) r.run.notes.push_back(suspicion);
@@ -146,6 +158,13 @@ LIESTAT_FUSION_INLINE CovarianceDiagnosis diagnoseCovariances(std::span<const Di
     return (options.order && c.order != *options.order) || (options.content && c.content != *options.content);
   });
   if (d.mode == DiagnosisMode::diagnosis) {
+    if (options.misfit && runs.size() == 1 && !options.edges) {
+      MatchedPoses matched;
+      for (const DiagnosedPose& p : d.poses) {
+        matched.push_back({{p.truth, detail::Matrix6d::Zero()}, {p.estimate, detail::Matrix6d::Zero()}});
+      }
+      d.misfit = detail::misfitOf(matched, d.times, runs[0].truth, d.alignment, runs[0].offset);
+    }
     d.diagnosis = diagnoseConventions(d.poses, fit);
   } else if (d.mode == DiagnosisMode::chain) {
     d.chain = diagnoseChain(d.poses, fit.hypotheses);

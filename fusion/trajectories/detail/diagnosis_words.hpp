@@ -186,6 +186,15 @@ LIESTAT_FUSION_INLINE Verdict CovarianceDiagnosis::verdict() const {
     return Verdict::yes("identified: " + describe(chain->accepted.front()));
   }
   std::string word = name(diagnosis->verdict);
+  if (misfit.found()) {
+    std::vector<std::string> notes = diagnosis->notes;
+    notes.insert(notes.begin(), word + ": " + diagnosis->reason);
+    const std::string text =
+        "MISFIT: " + misfit.sentence() + "; until that is undone the errors say nothing of covariances";
+    return diagnosis->verdict == DiagnosisVerdict::inconsistent || diagnosis->verdict == DiagnosisVerdict::none
+               ? Verdict::no(text, notes)
+               : Verdict::none(text, notes);
+  }
   if (diagnosis->verdict == DiagnosisVerdict::identified) return Verdict::yes(word + ": " + diagnosis->reason);
   std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return std::toupper(c); });
   const std::string text = word + ": " + diagnosis->reason;

@@ -3,6 +3,7 @@
 
 #include <fusion/evaluate.hpp>
 #include <fusion/trajectories/detail/quaternion_order.hpp>
+#include <fusion/trajectories/detail/run_misfit.hpp>
 #include <fusion/trajectory_misfit.hpp>
 #include <lie/euler.hpp>
 #include <lie/units.hpp>
@@ -170,21 +171,6 @@ inline std::string noteOfCoarseReference(const TrajectoryEvaluation& e) {
          " of the errors; NEES allows for it, APE and RPE contain it";
 }
 
-inline MisfitSearch misfitOf(const TrajectoryEvaluation& e, std::span<const double> truth_times,
-                             const NoisyPoses& truth, const EvaluationOptions& o) {
-  std::vector<SE3d> estimate, reference;
-  for (std::size_t i = 0; i < e.matched.size(); ++i) {
-    estimate.push_back(e.matched.estimate.mean(i)), reference.push_back(e.matched.reference.mean(i));
-  }
-  std::vector<double> times;
-  std::vector<TimedPose> stream;
-  if (e.by_time) {
-    for (const double t : e.times) times.push_back(t + o.association.offset);
-    for (std::size_t i = 0; i < truth_times.size(); ++i) stream.push_back({truth_times[i], truth.mean(i)});
-  }
-  return findMisfit(estimate, reference, times, PoseStream(stream), o.alignment, o.association.offset);
-}
-
 /// Errors by the length of a segment: multiples of 8 m, or of 8 times 1, 2, 5 · 10ᵏ m where a path is too short or too
 /// long for three to eight of them.
 inline std::vector<SegmentErrors> segmentErrors(const MatchedPoses& poses, const Alignment& alignment) {
@@ -343,14 +329,23 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
   Associated association = associate({truth.times(), truth.poses().size(), reference_name},
                                      {left.times(), left.poses().size(), estimate_name}, o.association);
   e.by_time = association.by_time;
-  if (!association.ok()) return refuse(association.status, association.reason);
+  const auto withTimes = [&](std::string reason) {
+    return detail::reasonWithTimes(std::move(reason), left.times(), left.poses(), truth.times(), truth.poses(),
+                                   o.association.offset);
+  };
+  if (!association.ok()) {
+    const bool times = detail::lacksPartners(association.status);
+    return refuse(association.status, times ? withTimes(association.reason) : association.reason);
+  }
   e.matched =
       matchedPoses(association.matches, truth.poses(), left.poses(), o.association.interpolation, truth.times());
-  estimate.poses = {};
   if (e.matched.size() < 2) {
     return refuse(EvaluationStatus::too_few,
-                  std::to_string(e.matched.size()) + " pose has a partner in " + reference_name);
+                  withTimes(std::to_string(e.matched.size()) + " pose has a partner in " + reference_name));
   }
+  // Times in another unit give next to no partners: that is said unasked.
+  const bool few = e.by_time && detail::fewPartners(e.matched.size(), left.times().size());
+  if (!o.misfit && !few) estimate.poses = {};
   if (!reference.has_covariances) e.matched.reference.forgetCovariances();
   if (!estimate.has_covariances) e.matched.estimate.forgetCovariances();
   // The verdict alone needs the covariances of the error, which would be most of the memory.
@@ -361,14 +356,21 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
     e.times.push_back(e.by_time ? left.times()[m.estimate] : static_cast<double>(m.estimate));
     e.rows.push_back(left.rowOf(m.estimate));
   }
-  estimate.times = {};
+  if (o.misfit || few) {
+    // Where most have no partner all of them tell of their times.
+    const PoseStream stream = detail::streamOf(e.by_time ? truth.times() : std::span<const double>(), truth.poses());
+    if (e.by_time && 2 * e.matched.size() < left.times().size()) {
+      e.misfit = findTimeScale(detail::streamOf(left.times(), left.poses()), stream, o.association.offset);
+    }
+    if (o.misfit && !e.misfit.found()) {
+      e.misfit = detail::misfitOf(e.matched, e.times, stream, o.alignment, o.association.offset);
+    }
+  }
+  estimate.poses = {}, estimate.times = {};
   if (!e.has_covariances) association.matches = {};
   const std::string suspicion = suspectQuaternionOrder(e.matched, reference_name, estimate_name);
   if (!suspicion.empty()) e.notes.push_back(suspicion);
-  if (o.misfit) {
-    e.misfit = detail::misfitOf(e, truth.times(), truth.poses(), o);
-    if (e.misfit.found()) e.notes.push_back(e.misfit.sentence());
-  }
+  if (e.misfit.found()) e.notes.push_back(e.misfit.sentence());
 
   e.alignment = alignUmeyama(e.matched, o.alignment, o.n_to_align);
   if (!e.alignment.ok && e.has_covariances && alignWeighted(e.matched, o.verdictAlignment(), o.n_to_align).ok) {

@@ -5,6 +5,7 @@
 #include <lie/units.hpp>
 
 #include <cmath>
+#include <utility>
 
 namespace liestat {
 
@@ -16,6 +17,23 @@ inline std::string listed(const Eigen::Vector3d& x) {
 /// "1.3 m and 2.5 deg".
 inline std::string sizesOf(double position, double rotation) {
   return significant(position, 3) + " m and " + significant(rotation / units::degree, 3) + " deg";
+}
+/// "the times are in ms (--time-unit ms)".
+inline std::string timesInWords(double factor, double zero) {
+  std::string text;
+  for (const auto& [name, seconds] : {std::pair("ms", 1e-3), std::pair("us", 1e-6), std::pair("ns", 1e-9)}) {
+    const bool reference = std::abs(factor * seconds - 1) < 0.02;
+    if (!reference && !(std::abs(factor / seconds - 1) < 0.02)) continue;
+    text = std::string(reference ? "the times of the reference" : "the times") + " are in " + name + " (" +
+           (reference ? "--ref-time-unit " : "--time-unit ") + name + ")";
+    if (reference) zero *= seconds;
+  }
+  if (text.empty()) {
+    return "the times run " + significant(factor > 1 ? factor : 1 / factor, 4) + " times too " +
+           (factor > 1 ? "slowly" : "fast") + " (the reference's are theirs times " + significant(factor, 4) +
+           ", plus " + significant(zero, 4) + " s)";
+  }
+  return std::abs(zero) > 1e-3 ? text + " and begin elsewhere (about --t_offset " + significant(zero, 6) + ")" : text;
 }
 inline std::string poseInWords(const SE3d& T) {
   return "moved by " + listed(T.translation()) + " m and turned by " + listed(T.so3().log() / units::degree) + " deg";
@@ -93,6 +111,9 @@ LIESTAT_FUSION_INLINE std::string MisfitExplanation::text() const {
         all += "the axes are mirrored: a left-handed frame (x y z of the reference are " + axesInWords(position_axes) +
                " of the estimate)";
         break;
+      case Misfit::time_scale:
+        all += timesInWords(time_factor, offset);
+        break;
       case Misfit::mirrored_positions:
         all += "the axes of the positions are mirrored, the rotations are not (x y z of the reference are " +
                axesInWords(position_axes) + " of the estimate)";
@@ -105,6 +126,10 @@ LIESTAT_FUSION_INLINE std::string MisfitExplanation::text() const {
 LIESTAT_FUSION_INLINE std::string MisfitSearch::sentence() const {
   if (!found()) return {};
   const MisfitExplanation& first = explanations.front();
+  if (first.faults.front() == Misfit::time_scale) {
+    return first.text() + ": the motion then agrees with the reference's (correlation " +
+           significant(std::sqrt(first.explained), 3) + ")";
+  }
   std::string all = "explained " + significant(100 * first.explained, 4) + " % of the error (" +
                     detail::sizesOf(position_rmse, rotation_rmse) + " become " +
                     detail::sizesOf(first.position_rmse, first.rotation_rmse) + "): " + first.text();
