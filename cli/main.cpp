@@ -9,7 +9,7 @@ int main(int argc, char** argv) {
       {{"",
         "",
         {addCompareCommand, addConvertCommand, addDoctorCommand, addEvaluateCommand, addFitCommand, addHandEyeCommand,
-         addMeanCommand, addMergeCommand, addMotionCommand, addPreintegrateCommand, addTwoViewCommand,
+         addMeanCommand, addMergeCommand, addMotionCommand, addPreintegrateCommand, addTrackCommand, addTwoViewCommand,
          addViInitCommand}},
        {"simulate",
         "Files of simulated measurements with their truth",

@@ -18,7 +18,7 @@ set(LIESTAT_COMPILED_SOURCES_estimation constrained implicit_ekf fits)
 set(LIESTAT_COMPILED_SOURCES_laws directional_laws compare_groups)
 set(LIESTAT_COMPILED_SOURCES_fusion
     initialisation initialisation_truth recording noise_calibration homography_models epipolar_models pose_models
-    robust_two_view two_view hand_eye motion)
+    robust_two_view two_view hand_eye motion patch tracker)
 set(LIESTAT_COMPILED_SOURCES_trajectories
     trajectories evaluate trajectory_misfit convention_diagnosis trajectory_conversion recording_windows)
 set(LIESTAT_COMPILED_NEEDS_laws random123)
@@ -101,7 +101,7 @@ function(liestat_compiled part root library)
   add_library(liestat::${part} ALIAS ${target})
   if(part STREQUAL "formats")
     # No header of formats/ includes them.
-    target_link_libraries(${target} PUBLIC ${library} PRIVATE ${packages})
+    target_link_libraries(${target} PUBLIC ${library} PRIVATE ${packages} ${CMAKE_DL_LIBS})
     foreach(name IN LISTS LIESTAT_COMPILED_OPTIONAL_${part})
       if(TARGET liestat_${name})
         string(TOUPPER LIESTAT_HAS_${name} has)

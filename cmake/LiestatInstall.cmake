@@ -39,6 +39,10 @@ install(FILES ${PROJECT_BINARY_DIR}/liestat.pc DESTINATION ${liestat_pc_dir})
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 if(TARGET liestat_program)
   install(TARGETS liestat_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program OPTIONAL)
+  if(TARGET liestat_opencv_module)
+    # The program looks for it there, relative to its own place.
+    install(TARGETS liestat_opencv_module LIBRARY DESTINATION lib/liestat COMPONENT program OPTIONAL)
+  endif()
   install(FILES ${PROJECT_BINARY_DIR}/liestat.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program OPTIONAL)
   install(FILES ${PROJECT_BINARY_DIR}/liestat.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
           RENAME liestat COMPONENT program OPTIONAL)

@@ -90,7 +90,7 @@ Places timesOfTracks(const NumericTable& table, std::int64_t start_ns, ImageTrac
 }
 
 NumericTable tableOfTracks(std::string_view text, const std::string& name, bool with_times) {
-  NumericTable table = parseTable(text, name, {"frame", "track"}, {"u", "v", "uL", "vL", "t_s"});
+  NumericTable table = parseTable(text, name, {"frame", "track"}, {"u", "v", "uL", "vL", "t_s", "sigma"});
   const bool pixels = (table.has("u") && table.has("v")) || (table.has("uL") && table.has("vL"));
   // The reader of tables knows best how to say what is missing.
   if (!pixels) return parseTable(text, name, {"frame", "track", "u", "v"});
@@ -101,6 +101,12 @@ NumericTable tableOfTracks(std::string_view text, const std::string& name, bool 
 }
 
 }  // namespace
+
+double sigmaOfTrack(const NumericTable& table, std::size_t row, std::size_t column) {
+  const double sigma = table(row, column);
+  if (!(sigma > 0)) throw InputError(table.file(), table.line(row), fmt::format("sigma {:g}", sigma), "above 0, px");
+  return sigma;
+}
 
 ImageTracks parseImageTracks(std::string_view tracks_text, const std::string& tracks_name, std::string_view times_text,
                              const std::string& times_name, std::int64_t start_ns) {
@@ -113,6 +119,8 @@ ImageTracks parseImageTracks(std::string_view tracks_text, const std::string& tr
   const std::size_t u = table.column(left ? "uL" : "u"), v = table.column(left ? "vL" : "v");
   const bool has_time = table.has("t_s");
   const std::size_t t_s = table.column("t_s");
+  result.has_sigmas = table.has("sigma");
+  const std::size_t sigma = table.column("sigma");
 
   result.observations.reserve(table.rows());
   for (std::size_t row = 0; row < table.rows(); ++row) {
@@ -132,7 +140,8 @@ ImageTracks parseImageTracks(std::string_view tracks_text, const std::string& tr
       }
     }
     result.track_ids.push_back(track);
-    result.observations.push_back({image->second, track, table(row, u), table(row, v), line});
+    result.observations.push_back({image->second, track, table(row, u), table(row, v), line,
+                                   result.has_sigmas ? sigmaOfTrack(table, row, sigma) : 0});
   }
 
   std::sort(result.track_ids.begin(), result.track_ids.end());

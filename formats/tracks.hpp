@@ -3,6 +3,7 @@
 
 #include <fusion/camera_calibration.hpp>
 #include <fusion/stereo.hpp>
+#include <formats/numeric_table.hpp>
 
 #include <Eigen/Core>
 
@@ -20,12 +21,14 @@ struct ImageTracks {
   std::vector<std::size_t> frames;             ///< the number of each image in the files
   std::vector<PixelObservation> observations;  ///< by images, then by tracks
   std::vector<std::size_t> track_ids;          ///< the number of each track in the file, ascending
+  bool has_sigmas = false;                     ///< each observation has its own
   std::size_t seen_once = 0;                   ///< tracks with one observation, which are of no use but kept
   std::string format;                          ///< the times': euroc, csv (a file frame,t_s), or t_s (a column)
 };
 
 /// Reads tracks, CSV with the columns frame, track, u, v (or those of the left of a stereo pair, uL and vL) and, unless
-/// there is a file of times, t_s; and the times of the images, CSV with the columns frame and t_s, or EuRoC's
+/// there is a file of times, t_s, and where each observation has its own standard deviation sigma (px), as those of
+/// `liestat track` have; and the times of the images, CSV with the columns frame and t_s, or EuRoC's
 /// cam0/data.csv (timestamp [ns], filename), whose rows are frames 0, 1, ... Frames may begin anywhere and leave some
 /// out; with a file of times an image is a row of it, seen into or not. Seconds are those of the clock of `start_ns`:
 /// it is subtracted. Throws InputError with the line: a frame and track again, a frame without a time, times that do
@@ -35,6 +38,9 @@ ImageTracks readImageTracks(const std::string& tracks, const std::string& image_
 /// The same from memory.
 ImageTracks parseImageTracks(std::string_view tracks_text, const std::string& tracks_name, std::string_view times_text,
                              const std::string& times_name, std::int64_t start_ns);
+
+/// The standard deviation of a row of tracks; throws InputError unless it is above 0.
+double sigmaOfTrack(const NumericTable& table, std::size_t row, std::size_t column);
 
 /// Where no image is among the readings: which unit the stamps of one of the two files may have, if not nanoseconds, in
 /// words. `image_time` is that of an image on the clock that shows start_ns at zero. Empty: no suspicion.

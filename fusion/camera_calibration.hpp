@@ -16,6 +16,7 @@ struct PixelObservation {
   double u = 0;
   double v = 0;
   std::size_t line = 0;  ///< line in the file that it was read from; 0: none
+  double sigma = 0;      ///< px: standard deviation of u and of v; 0: not known
 };
 
 /// A camera and where it sits on the inertial sensor.

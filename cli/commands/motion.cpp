@@ -93,7 +93,10 @@ void addMotionCommand(const CommandList& app) {
   command.option(
       "--calibration", input.calibration,
       "YAML with a camera (EuRoC, Kalibr, OpenVINS), its first one, and of an IMU; several files are merged");
-  command.option("--sigma", input.sigma, "px: noise of each image coordinate (default 0.5)").positive();
+  command
+      .option("--sigma", input.sigma,
+              "px: noise of each image coordinate (default: the tracks' column sigma, else 0.5)")
+      .positive();
   command.option("--rates", input.rates, "CSV frame,t_s,wx,wy,wz: rotation rates in rad/s, as a prior");
   command.choice("--rates-axes", input.axes,
                  std::map<std::string, RateAxes>{{"camera", RateAxes::camera}, {"vehicle", RateAxes::vehicle}},

@@ -25,6 +25,7 @@ constexpr const char* motion_name = "liestat motion";
 /// A quaternion of the command line is a unit quaternion within this.
 constexpr double unit_tolerance = 1e-3;
 constexpr std::size_t max_frames = 1000000;
+constexpr double default_sigma = 0.5;  // px
 /// Fewer observations than the filter asks for in one frame tell nothing of their unit.
 constexpr std::size_t min_observations_of_a_unit = 8;
 
@@ -45,19 +46,18 @@ Camera cameraOf(const MotionInputOptions& options, const Calibration& calibratio
 class TrackRays {
  public:
   TrackRays(const MotionInputOptions& options, const Camera& camera)
-      : options_(options), camera_(camera), sigma_(options.sigma / std::sqrt(camera.fu * camera.fv)) {
-    if (sigma_ > 0.1) {
-      throw OptionError(
-          motion_name, fmt::format("--sigma {:g} is {:.3g} of the focal length {:g}", options.sigma, sigma_, camera.fu),
-          "both in pixels");
-    }
+      : options_(options), camera_(camera), per_pixel_(1 / std::sqrt(camera.fu * camera.fv)) {
+    if (options.sigma) requireSmall(*options.sigma, "--sigma");
   }
 
-  void add(std::size_t frame, std::uint64_t track, double u, double v) {
+  /// `own`: px, or 0.
+  void add(std::size_t frame, std::uint64_t track, double u, double v, double own) {
+    if (!options_.sigma && own > 0) requireSmall(own, "sigma");
+    const double sigma = options_.sigma.value_or(own > 0 ? own : default_sigma) * per_pixel_;
     std::vector<TrackObservation>& observations = tracks_.frames[frame];
     const auto bearing = camera_.bearing({u, v});
     if (bearing && bearing->z() > 0) {
-      observations.push_back({track, bearing->head<2>() / bearing->z(), sigma_});
+      observations.push_back({track, bearing->head<2>() / bearing->z(), sigma});
       units_.add({u, v}, observations.back().at);
     } else {
       ++tracks_.outside;
@@ -75,6 +75,13 @@ class TrackRays {
   }
 
  private:
+  void requireSmall(double sigma, const char* what) const {
+    if (sigma * per_pixel_ <= 0.1) return;
+    throw OptionError(
+        motion_name,
+        fmt::format("{} {:g} is {:.3g} of the focal length {:g}", what, sigma, sigma * per_pixel_, camera_.fu),
+        "both in pixels");
+  }
   void requireUnit() {
     if (units_.size() + tracks_.outside < min_observations_of_a_unit) return;
     if (units_.size() == 0) {
@@ -88,14 +95,14 @@ class TrackRays {
 
   const MotionInputOptions& options_;
   Camera camera_;
-  double sigma_;
+  double per_pixel_;
   MotionTracks tracks_;
   CoordinateUnits units_;
 };
 
 MotionTracks readTracks(const MotionInputOptions& options, const Camera& camera) {
   TrackRays rays(options, camera);
-  const NumericTable table = readTable(options.tracks, {"frame", "track"}, {"u", "v", "uL", "vL"});
+  const NumericTable table = readTable(options.tracks, {"frame", "track"}, {"u", "v", "uL", "vL", "sigma"});
   const bool left = !table.has("u");
   if (!(table.has(left ? "uL" : "u") && table.has(left ? "vL" : "v"))) {
     throw InputError(table.file(), 0, "there are no image coordinates", "columns u and v, or uL and vL");
@@ -108,7 +115,8 @@ MotionTracks readTracks(const MotionInputOptions& options, const Camera& camera)
       throw InputError(table.file(), table.line(row), fmt::format("track {} again in frame {}", track, frame),
                        "it once per frame");
     }
-    rays.add(frame, track, table(row, u), table(row, v));
+    rays.add(frame, track, table(row, u), table(row, v),
+             table.has("sigma") ? sigmaOfTrack(table, row, table.column("sigma")) : 0);
   }
   return rays.take();
 }
@@ -198,7 +206,7 @@ MotionInput readMotionInput(const MotionInputOptions& options) {
   const ImageTracks images = readImageTracks(options.tracks, options.image_times, imu.start_ns);
   TrackRays rays(options, camera);
   for (const PixelObservation& seen : images.observations) {
-    rays.add(images.frames[seen.image], images.track_ids[seen.track], seen.u, seen.v);
+    rays.add(images.frames[seen.image], images.track_ids[seen.track], seen.u, seen.v, seen.sigma);
   }
   input.tracks = rays.take();
   const CameraCalibration& first = calibration.cameras.front();

@@ -28,9 +28,9 @@ struct MotionInputOptions {
   std::vector<double> gyroscope_bias;          ///< rad/s, taken off the readings
   std::optional<double> gyroscope_noise = {};  ///< rad/s/√Hz, goes before the calibration's
   RateAxes axes = RateAxes::camera;
-  double sigma = 0.5;        ///< px
-  double rate_sigma = 0.1;   ///< deg per frame
-  double largest_gap = 0.1;  ///< s between two readings
+  std::optional<double> sigma = {};  ///< px; goes before the tracks' own, which go before 0.5
+  double rate_sigma = 0.1;           ///< deg per frame
+  double largest_gap = 0.1;          ///< s between two readings
 };
 
 /// Tracks frame by frame.

@@ -27,6 +27,8 @@ namespace {
 
 constexpr const char* command_name = "liestat vi-init";
 
+constexpr double default_pixel_noise = 1;
+
 struct Options {
   ImuOptions imu;
   std::string tracks, image_times, truth, json, report, camera;
@@ -34,7 +36,8 @@ struct Options {
   std::vector<double> intrinsics;
   std::optional<FilterConvention> filter_start;
   bool free_gravity = false, no_consensus = false, no_refinement = false, known_biases = false, true_biases = false;
-  double gravity = 9.81, noise_factor = 1, pixel_noise = 1;
+  double gravity = 9.81, noise_factor = 1;
+  std::optional<double> pixel_noise = {};
   VisualInertialOptions how;
 };
 
@@ -91,12 +94,11 @@ VisualInertialRecording measurementsOf(const ViRecording& recording, const Optio
     measured.image_times.push_back(t + recording.camera.timeshift_cam_imu);
   }
   measured.cameras = {recording.camera.imu_T_cam};
-  std::vector<PixelMeasurement> pixels;
-  pixels.reserve(recording.tracks.observations.size());
   for (const PixelObservation& seen : recording.tracks.observations) {
-    pixels.push_back({.image = seen.image, .track = seen.track, .pixel = {seen.u, seen.v}});
+    const double sigma = options.pixel_noise.value_or(seen.sigma > 0 ? seen.sigma : default_pixel_noise);
+    const auto ray = recording.camera.camera.bearingWithSigma({seen.u, seen.v}, sigma);
+    if (ray) measured.observations.push_back({seen.image, seen.track, ray->direction, ray->sigma});
   }
-  measured.observations = bearingsOf(pixels, std::span(&recording.camera.camera, 1), options.pixel_noise);
   return measured;
 }
 
@@ -208,7 +210,9 @@ void addViInitCommand(const CommandList& app) {
       "--calibrate-noise,!--no-calibrate-noise", how.calibrate_noise,
       "Test these densities where windows meet, and multiply them by the factors at which windows agree if they "
       "refute them (default); --no-calibrate-noise: use them as they are");
-  command.option("--pixel-noise", options->pixel_noise, "Standard deviation of u and of v, pixels (default 1)")
+  command
+      .option("--pixel-noise", options->pixel_noise,
+              "Standard deviation of u and of v, pixels (default: the tracks' column sigma, else 1)")
       .range(1e-6, 1e3);
   command.option("--window", how.window, "s (default 2)").range(0.1, 60.);
   command.option("--stride", how.stride, "s from one window's start to the next (default: the window)")

@@ -43,6 +43,7 @@ from ._files import (
     read_tracks,
     read_two_view_pair,
     read_two_view_pairs,
+    track,
 )
 from ._gaussians import (
     CONVENTIONS,

@@ -117,9 +117,28 @@ def read_tracks(path, image_times="", *, start_ns=0):
     -------
     Result
         `image_times` (s, less `start_ns`), and for each observation `images` (index into the times), `tracks` (counted
-        from 0), `pixels`; `frames` and `track_ids` are the numbers in the file.
+        from 0), `pixels`, and `sigmas` (px) where the file has them; `frames` and `track_ids` are the numbers in the file.
     """
     return Result("tracks", **_reader("read_tracks")(os.fspath(path), os.fspath(image_times), int(start_ns)))
+
+
+def track(paths, times="", *, every=1, tracks=300, least=8):
+    """Tracks of corners through a video, a folder of images, or a list of them, with a standard deviation for each point.
+
+    `times`: CSV frame,t_s or EuRoC's data.csv; `every`: takes one image of so many; `tracks`: at a time; `least`: images
+    that must show a track. Raises ValueError, also where liestat was built without OpenCV (the message names the packages).
+
+    Returns
+    -------
+    Result
+        As `read_tracks`: `image_times` (s; NaN where not known), `frames`, and for each observation `images`, `tracks`,
+        `pixels`, `sigmas` (px, of u and of v).
+    """
+    if every < 1 or tracks < 1 or least < 2:
+        raise ValueError("every and tracks are 1 or more, least 2 or more")
+    names = [paths] if isinstance(paths, (str, os.PathLike)) else paths
+    arguments = [os.fspath(p) for p in names], os.fspath(times), int(every), int(tracks), int(least)
+    return Result("tracks", **_reader("track")(*arguments))
 
 
 def read_calibration(*paths):

@@ -1,11 +1,13 @@
 // The readers of formats/ for Python, but for those of trajectories: columns by name.
 #include <formats/calibration.hpp>
 #include <formats/features.hpp>
+#include <formats/images.hpp>
 #include <formats/imu.hpp>
 #include <formats/input_error.hpp>
 #include <formats/pose_pairs.hpp>
 #include <formats/tracks.hpp>
 #include <formats/two_view_pairs.hpp>
+#include <fusion/tracking/tracker.hpp>
 #include <python/src/array_operations.hpp>
 #include <python/src/described.hpp>
 
@@ -14,6 +16,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <exception>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -96,6 +99,13 @@ py::dict readImuFile(const std::string& path) {
   return d;
 }
 
+template <class List>
+DoubleArray sigmasOf(const List& list) {
+  std::vector<double> sigmas;
+  for (const auto& seen : list) sigmas.push_back(seen.sigma);
+  return python::arrayOf(sigmas, {static_cast<py::ssize_t>(sigmas.size())});
+}
+
 py::dict readTracksFile(const std::string& path, const std::string& image_times, std::int64_t start_ns) {
   const ImageTracks file = released([&] { return readImageTracks(path, image_times, start_ns); });
   std::vector<std::int64_t> images, tracks;
@@ -114,6 +124,40 @@ py::dict readTracksFile(const std::string& path, const std::string& image_times,
     out[0] = seen.u;
     out[1] = seen.v;
   });
+  if (file.has_sigmas) d["sigmas"] = sigmasOf(file.observations);
+  return d;
+}
+
+/// The tracks of images, in the layout of readTracksFile.
+py::dict trackFiles(const std::vector<std::string>& paths, const std::string& times, std::size_t every,
+                    const TrackerOptions& options) {
+  std::vector<double> image_times;
+  std::vector<std::int64_t> frames, images, tracks;
+  const std::vector<TrackedPoint> points = released([&] {
+    ImageReader reader(paths, times, every, "liestat.track");
+    const std::unique_ptr<PointFlow> flow = imageLibrary("liestat.track").pointFlow();
+    Tracker tracker(*flow, options);
+    for (GreyView image = reader.next(); image.pixels != nullptr; image = reader.next()) {
+      frames.push_back(static_cast<std::int64_t>(reader.frame()));
+      image_times.push_back(reader.time());
+      tracker.take(image);
+    }
+    return tracker.finish();
+  });
+  for (const TrackedPoint& p : points) {
+    images.push_back(static_cast<std::int64_t>(p.image));
+    tracks.push_back(static_cast<std::int64_t>(p.track));
+  }
+  py::dict d;
+  d["image_times"] = python::arrayOf(image_times, {static_cast<py::ssize_t>(image_times.size())});
+  d["frames"] = integers(frames);
+  d["images"] = integers(images);
+  d["tracks"] = integers(tracks);
+  d["pixels"] = rowsOf(points, 2, [](const auto& seen, double* out) {
+    out[0] = seen.u;
+    out[1] = seen.v;
+  });
+  d["sigmas"] = sigmasOf(points);
   return d;
 }
 
@@ -239,6 +283,9 @@ void bindReaders(py::module_& module) {
   module.def("read_features", &readFeatures);
   module.def("read_imu", &readImuFile);
   module.def("read_tracks", &readTracksFile);
+  module.def("track",
+             [](const std::vector<std::string>& paths, const std::string& times, std::size_t every, std::size_t tracks,
+                std::size_t least) { return trackFiles(paths, times, every, {.tracks = tracks, .least = least}); });
   module.def("read_calibration", &readCalibrationFiles);
   module.def("read_imu_noise", [](const std::string& path) { return arrayOf(readImuNoise(path)); });
   module.def("read_ground_truth", &readGroundTruthFile);

@@ -1,5 +1,6 @@
 """The readers of files."""
 
+import os
 import tempfile
 import unittest
 from pathlib import Path
@@ -53,6 +54,29 @@ class Files(unittest.TestCase):
         self.assertEqual((tracks.images.tolist(), tracks.tracks.tolist()), ([0, 1, 1], [0, 0, 1]))
         np.testing.assert_array_equal(tracks.pixels, [[1, 2], [3, 4], [5, 6]])
         np.testing.assert_array_equal(tracks.track_ids, [7, 9])
+        tracks = liestat.read_tracks(self.write("frame,track,u,v,t_s,sigma", [[*row, 0.1] for row in rows]))
+        np.testing.assert_array_equal(tracks.sigmas, [0.1, 0.1, 0.1])
+
+    def test_track(self):
+        texture = np.random.default_rng(1).integers(0, 255, (30, 40)).repeat(8, 0).repeat(8, 1).astype(np.uint8)
+        with tempfile.TemporaryDirectory() as directory:
+            names = [os.path.join(directory, f"{i}.pgm") for i in range(3)]
+            for i, name in enumerate(names):
+                with open(name, "wb") as file:
+                    file.write(b"P5\n300 220\n255\n" + texture[10 : 230, 10 + i : 310 + i].tobytes())
+            try:
+                tracks = liestat.track(directory)
+            except ValueError as error:
+                # Built without OpenCV.
+                self.assertIn("libopencv-video-dev", str(error))
+                return
+            self.assertEqual(tracks.frames.tolist(), [0, 1, 2])
+            last = tracks.pixels[tracks.images == 2] - tracks.pixels[tracks.images == 0]
+            np.testing.assert_allclose(last, np.tile([-2.0, 0.0], (len(last), 1)), atol=0.02)
+            self.assertGreater(len(last), 50)
+            self.assertTrue(np.all((tracks.sigmas > 0) & (tracks.sigmas < 0.1)))
+            with self.assertRaisesRegex(ValueError, "there is one image"):
+                liestat.track(names[:1])
 
     def test_bag(self):
         path = ROOT / "tests/data/bags/unindexed.mcap"

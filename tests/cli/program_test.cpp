@@ -169,8 +169,8 @@ TEST_F(Program, AMistypedWordIsNamedWithTheNearest) {
     return r.errors;
   };
   const std::string commands =
-      "Commands: convert, doctor, evaluate, fit, hand-eye, mean, merge, motion, preintegrate, two-view, vi-init, "
-      "simulate, "
+      "Commands: convert, doctor, evaluate, fit, hand-eye, mean, merge, motion, preintegrate, track, two-view, "
+      "vi-init, simulate, "
       "validate (liestat --help "
       "explains "
       "the usage)\n";
