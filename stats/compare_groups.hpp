@@ -43,7 +43,7 @@ std::vector<Eigen::MatrixXd> tangentGroups(const std::vector<std::vector<M>>& gr
     return {};
   }
   M centre = ManifoldTraits<M>::origin();
-  Status status = Status::not_converged;
+  auto status = Status::not_converged;
   bool concentrated = true;
   if constexpr (Metric<M>) {
     const auto found = liestat::mean(all);
