@@ -129,6 +129,19 @@ class DoctorParity(ParityTest):
             )
             self.compare([estimate, moved, *words, "--align", align], ours)
 
+    def test_misfit(self):
+        truth, poses, covariances = scene(60, 13)
+        times = np.arange(60) * 0.1
+        inverted = self.estimate("est.txt", poses.inv(), covariances, "right", times)
+        reference, truth = self.truth("gt.tum", truth, times)
+        read = self.read(inverted)
+        ours = liestat.diagnose_conventions(
+            read.poses, read.matrices, truth, times=read.times, truth_times=times, misfit=True
+        )
+        self.assertEqual(ours.misfit.explanations[0].faults, ["inverse"], ours.sentence)
+        self.assertTrue(ours.sentence.startswith("MISFIT: explained"), ours.sentence)
+        self.compare([inverted, reference, "--format", "tum", "--cov-layout", "full36", "--misfit"], ours)
+
     def test_association(self):
         truth, poses, covariances = scene(60, 12)
         times = np.arange(60) * 0.1
