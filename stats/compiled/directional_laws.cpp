@@ -474,9 +474,35 @@ class Moments {
   VectorXd expected_;
 };
 
-/// The covariances of moments, less what the fit takes of them, and of scores, by a sample of the law.
+/// The sizes of the standardised coordinates along each axis, ascending; `x` holds coordinates, or logs, in rows.
+std::vector<std::vector<double>> sortedSizes(const Core& core, const MatrixXd& x) {
+  std::vector<std::vector<double>> sizes;
+  for (Index i = 0; i < dofOf(core.law.model); ++i) {
+    const bool wrapped = core.law.model == LawModel::wrapped_normal;
+    const VectorXd y =
+        wrapped ? VectorXd(x * core.law.axes.col(i) / core.tau[i]) : VectorXd(x.col(i) / std::sqrt(core.tau[i]));
+    std::vector<double>& list = sizes.emplace_back();
+    for (const double value : y) list.push_back(std::abs(value));
+    std::sort(list.begin(), list.end());
+  }
+  return sizes;
+}
+
+/// Kolmogorov's and Smirnov's largest difference of the distributions of two ascending samples.
+double largestDifference(const std::vector<double>& a, const std::vector<double>& b) {
+  double largest = 0;
+  for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
+    (a[i] <= b[j] ? i : j) += 1;
+    largest = std::max(largest, std::abs(static_cast<double>(i) / static_cast<double>(a.size()) -
+                                         static_cast<double>(j) / static_cast<double>(b.size())));
+  }
+  return largest;
+}
+
+/// The covariances of moments, less what the fit takes of them, and of scores, by a sample of the law, and its sizes.
 struct Reference {
   MatrixXd moments, information;
+  std::vector<std::vector<double>> sizes;
 
   Reference(const Core& core, std::uint64_t seed) {
     const Index draws = core.law.model == LawModel::wrapped_normal ? 20000 : 5000;
@@ -484,12 +510,15 @@ struct Reference {
     const Sampler sampler(core.law);
     const MatrixXd basis = basisOf(core.law);
     MatrixXd h = MatrixXd::Zero(judge.size(), draws), s = MatrixXd::Zero(judge.scores(), draws);
+    MatrixXd all(draws, core.x.cols());
     CounterRng rng(seed, 0);
     for (Index i = 0; i < draws; ++i) {
       Few x = coordinates(core.law.model, basis, sampler.draw(rng));
       if (core.law.model == LawModel::wrapped_normal) x = core.law.axes * logOf(x);
       judge.add(x, h.col(i), s.col(i));
+      all.row(i) = x.transpose();
     }
+    sizes = sortedSizes(core, all);
     s.colwise() -= VectorXd(s.rowwise().mean());
     h.colwise() -= VectorXd(h.rowwise().mean());
     information = s * s.transpose() / static_cast<double>(draws);
@@ -502,39 +531,47 @@ double lawDistance(const VectorXd& mean, const MatrixXd& covariance, double n) {
   return n * mean.dot(detail::solvedDefinite(covariance, mean).col(0));
 }
 
-/// Statistics of misfit, each with a law of χ² in large samples: all moments together, and the largest third and fourth
-/// moment along an axis; of vmf also the second moments that tell ovals. They are judged apart, for the fourth moments'
-/// heavy tails in small samples would hide the others.
+/// Statistics of misfit: χ² of all moments together, the largest of third and of fourth moments along an axis, the largest
+/// difference of distributions of sizes along one, and of vmf second moments, which tell ovals. They are judged apart, for
+/// the fourth moments' heavy tails in small samples would hide the others.
 struct Misfit {
-  Few statistics;
-  std::array<std::size_t, 4> dof{1, 1, 1, 2};
+  VectorXd statistics, p;  ///< p as in large samples
 
-  Misfit(const Moments& moments, const Reference& reference, bool vmf, double n) : statistics(vmf ? 4 : 3) {
+  Misfit(const Core& core, const Reference& reference) {
+    const Moments moments(core);
+    const bool vmf = core.law.model == LawModel::vmf;
     const VectorXd mean = moments.mean();
-    const Index m = moments.omnibus();
-    statistics.setZero();
-    statistics[0] = lawDistance(mean.head(m), reference.moments.topLeftCorner(m, m), n),
-    dof[0] = static_cast<std::size_t>(m);
+    const double n = static_cast<double>(core.x.rows());
+    const Index m = moments.omnibus(), d = dofOf(core.law.model);
+    statistics = p = VectorXd::Zero(vmf ? 5 : 4);
+    statistics[0] = lawDistance(mean.head(m), reference.moments.topLeftCorner(m, m), n);
     for (Index i = m; i < moments.size(); ++i) {
       double& largest = statistics[1 + (i - m) % 2];
       largest = std::max(largest, n * mean[i] * mean[i] / reference.moments(i, i));
     }
-    if (vmf) statistics[3] = lawDistance(mean.segment(m - 2, 2), reference.moments.block(m - 2, m - 2, 2, 2), n);
+    const std::vector<std::vector<double>> sizes = sortedSizes(core, core.x);
+    const double drawn = static_cast<double>(reference.sizes[0].size());
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+      const double difference = largestDifference(sizes[i], reference.sizes[i]);
+      statistics[3] = std::max(statistics[3], n * drawn / (n + drawn) * difference * difference);
+    }
+    if (vmf) statistics[4] = lawDistance(mean.segment(m - 2, 2), reference.moments.block(m - 2, m - 2, 2, 2), n);
+    const double axes = static_cast<double>(d);
+    p[0] = detail::chiSquaredTail(statistics[0], static_cast<std::size_t>(m));
+    p[1] = axes * detail::chiSquaredTail(statistics[1], 1), p[2] = axes * detail::chiSquaredTail(statistics[2], 1);
+    // Smirnov's law is that of a law that was not fitted, which makes it larger.
+    p[3] = axes * 2 * std::exp(-2 * statistics[3]);
+    if (vmf) p[4] = detail::chiSquaredTail(statistics[4], 2);
   }
 };
 
 void testGoodness(const Core& core, const Reference& reference, const LawFitOptions& options, LawFit& fit) {
-  const double n = static_cast<double>(fit.n), d = dofOf(core.law.model);
-  const bool vmf = core.law.model == LawModel::vmf;
-  const Misfit found(Moments(core), reference, vmf, n);
-  fit.goodness.statistic = found.statistics[0], fit.goodness.degrees_of_freedom = static_cast<int>(found.dof[0]);
+  const Misfit found(core, reference);
+  fit.goodness.statistic = found.statistics[0];
+  fit.goodness.degrees_of_freedom = static_cast<int>(Moments(core).omnibus());
+  if (core.law.model == LawModel::vmf) fit.symmetry = {found.statistics[4], 2, found.p[4]};
   const Index kinds = found.statistics.size();
-  Few p(kinds), above = Few::Zero(kinds);
-  for (Index k = 0; k < kinds; ++k) {
-    p[k] = detail::chiSquaredTail(found.statistics[k], found.dof[static_cast<std::size_t>(k)]) *
-           (k == 1 || k == 2 ? d : 1);
-  }
-  if (vmf) fit.symmetry = {found.statistics[3], 2, p[3]};
+  VectorXd p = found.p, above = VectorXd::Zero(kinds);
   if (fit.n < options.bootstrap_below) {
     // Besag and Clifford 1991: the draws end once each p is known to a fifth of itself; or once a statistic is far beyond
     // all of many draws, whose p is then taken for that of the last draw.
@@ -542,13 +579,17 @@ void testGoodness(const Core& core, const Reference& reference, const LawFitOpti
     constexpr double enough = 25, far = 4;
     const Sampler sampler(core.law);
     MatrixXd features(static_cast<Index>(fit.n), parametersOf(core.law.model));
-    Few largest = Few::Zero(kinds);
+    VectorXd largest = VectorXd::Zero(kinds);
     bool sure = false;
     while (fit.replicates < most && above.minCoeff() < enough && !sure) {
       CounterRng rng(options.seed, ++fit.replicates);
       for (Index i = 0; i < features.rows(); ++i) features.row(i) = sampler.draw(rng).transpose();
       const Core again = fitCore(core.law.model, features, false, 1e-6);
-      const Misfit drawn(Moments(again), reference, vmf, n);
+      if (!again.bounded) {
+        above.array() += 1;
+        continue;
+      }
+      const Misfit drawn(again, reference);
       largest = largest.cwiseMax(drawn.statistics);
       for (Index k = 0; k < kinds; ++k) above[k] += drawn.statistics[k] < found.statistics[k] ? 0 : 1;
       sure = fit.replicates >= many && (found.statistics - far * largest).maxCoeff() > 0;
