@@ -30,8 +30,8 @@ constexpr std::size_t most_digits = 9, stamp_digits = 16, largest_stamp_digits =
 bool isDigit(char c) { return c >= '0' && c <= '9'; }
 
 bool isImageName(const fs::path& path) {
-  static const std::set<std::string> known = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff",
-                                              ".pgm", ".ppm", ".pnm",  ".webp"};
+  static const std::set<std::string> known = {".png",  ".jpg", ".jpeg", ".bmp", ".tif",
+                                              ".tiff", ".pgm", ".ppm",  ".pnm", ".webp"};
   std::string ending = path.extension().string();
   for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return known.count(ending) > 0;
@@ -98,7 +98,9 @@ std::vector<double> timesOfNames(const std::vector<std::string>& files) {
   std::vector<Numbered> names;
   for (const std::string& file : files) names.push_back(numberOf(file));
   const auto all = [&](auto&& holds) { return std::all_of(names.begin(), names.end(), holds); };
-  if (all([](const Numbered& n) { return n.digits.size() >= stamp_digits && n.digits.size() <= largest_stamp_digits; })) {
+  if (all([](const Numbered& n) {
+        return n.digits.size() >= stamp_digits && n.digits.size() <= largest_stamp_digits;
+      })) {
     std::vector<double> times;
     for (const Numbered& n : names) times.push_back(1e-9 * static_cast<double>(std::stoull(n.digits)));
     return times;
@@ -141,7 +143,8 @@ std::vector<double> timesIn(const std::string& path, const std::vector<std::stri
       if (fields.size() < 2 || !detail::isNanoseconds(fields[0])) {
         throw InputError(file.name, reader.number(), "no stamp and name", "nanoseconds,file");
       }
-      by_name[std::string(fields[1])] = {1e-9 * static_cast<double>(std::stoull(std::string(fields[0]))), reader.number()};
+      by_name[std::string(fields[1])] = {1e-9 * static_cast<double>(std::stoull(std::string(fields[0]))),
+                                         reader.number()};
     }
     for (const std::string& image : files) {
       const auto found = by_name.find(fs::path(image).filename().string());
@@ -199,7 +202,8 @@ const ImageLibrary& imageLibrary(const std::string& user) {
       const fs::path file = place / beside / name;
       if (!fs::is_regular_file(file, error)) continue;
       void* const module = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
-      if (module == nullptr) throw InputError(file.string(), 0, dlerror(), "OpenCV's libraries, as it was built with them");
+      if (module == nullptr)
+        throw InputError(file.string(), 0, dlerror(), "OpenCV's libraries, as it was built with them");
       const auto open = reinterpret_cast<const ImageLibrary* (*)()>(dlsym(module, "liestat_image_library"));
       if (open == nullptr) throw InputError(file.string(), 0, "it is no module of liestat's");
       return *(library = open());
@@ -215,7 +219,8 @@ ImageReader::ImageReader(const std::vector<std::string>& paths, const std::strin
     : recording_(imagesOf(paths, times)), name_(paths[0]), times_(times), every_(every), time_(std::nan("")) {
   const ImageLibrary& library = imageLibrary(user);
   images_ = recording_.files.empty() ? library.openVideo(recording_.video) : library.openFiles(recording_.files);
-  if (!images_) throw InputError(recording_.video, 0, "it is no video that can be read", "a video, a folder, or images");
+  if (!images_)
+    throw InputError(recording_.video, 0, "it is no video that can be read", "a video, a folder, or images");
 }
 
 GreyView ImageReader::next() {
@@ -224,7 +229,7 @@ GreyView ImageReader::next() {
   for (std::size_t i = 1; taken_ > 0 && more && i < every_; ++i) more = images_->skip();
   if (more) image = images_->next();
   if (taken_ > 0) frame_ += every_;
-  const std::string file = recording_.files.empty() ? fmt::format("{}: frame {}", name_, frame_)
+  const std::string file = recording_.files.empty()           ? fmt::format("{}: frame {}", name_, frame_)
                            : frame_ < recording_.files.size() ? recording_.files[frame_]
                                                               : name_;
   if (more && !images_->fault().empty()) throw InputError(file, 0, images_->fault(), "an image");

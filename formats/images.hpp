@@ -31,7 +31,8 @@ const ImageLibrary& imageLibrary(const std::string& user);
 class ImageReader {
  public:
   /// Takes one image of `every`. Throws as imagesOf and imageLibrary do, and where a video can't be opened.
-  ImageReader(const std::vector<std::string>& paths, const std::string& times, std::size_t every, const std::string& user);
+  ImageReader(const std::vector<std::string>& paths, const std::string& times, std::size_t every,
+              const std::string& user);
 
   /// The next image, valid until the next call; without pixels at the end. Throws InputError for an image that can't be read
   /// or has another size, a stamp that does not ascend, and an end before the second image.

@@ -29,7 +29,7 @@ struct TrackCommandOptions {
 
 struct TrackedImages {
   std::size_t images = 0;
-  std::vector<double> times;        ///< s, of each; empty: not known
+  std::vector<double> times;  ///< s, of each; empty: not known
   int width = 0, height = 0;
   std::vector<TrackedPoint> points;
   std::array<std::size_t, track_ends> ends{};
@@ -62,8 +62,7 @@ std::string csvOf(const TrackedImages& tracked) {
   const bool times = !tracked.times.empty();
   std::string text = times ? "frame,track,u,v,sigma,t_s\n" : "frame,track,u,v,sigma\n";
   for (const TrackedPoint& p : tracked.points) {
-    fmt::format_to(std::back_inserter(text), "{},{},{:.5f},{:.5f},{:.5f}", p.image, p.track, p.u, p.v,
-                   p.sigma);
+    fmt::format_to(std::back_inserter(text), "{},{},{:.5f},{:.5f},{:.5f}", p.image, p.track, p.u, p.v, p.sigma);
     if (times) fmt::format_to(std::back_inserter(text), ",{:.9f}", tracked.times[p.image]);
     text += '\n';
   }
@@ -82,11 +81,13 @@ std::string summaryOf(const TrackedImages& tracked) {
   std::sort(tracks.begin(), tracks.end());
   const auto number = static_cast<std::size_t>(std::unique(tracks.begin(), tracks.end()) - tracks.begin());
   std::sort(sigmas.begin(), sigmas.end());
-  const auto quantile = [&](double q) { return sigmas[static_cast<std::size_t>(q * static_cast<double>(sigmas.size() - 1))]; };
+  const auto quantile = [&](double q) {
+    return sigmas[static_cast<std::size_t>(q * static_cast<double>(sigmas.size() - 1))];
+  };
   const double images = static_cast<double>(tracked.images), points = static_cast<double>(tracked.points.size());
-  std::string text = fmt::format(
-      "{} images of {} x {}, {} tracks, {} observations ({:.1f} an image, {:.1f} a track)\n", tracked.images,
-      tracked.width, tracked.height, number, tracked.points.size(), points / images, points / static_cast<double>(number));
+  std::string text = fmt::format("{} images of {} x {}, {} tracks, {} observations ({:.1f} an image, {:.1f} a track)\n",
+                                 tracked.images, tracked.width, tracked.height, number, tracked.points.size(),
+                                 points / images, points / static_cast<double>(number));
   text += fmt::format("sigma: median {:.3f} px, 5 to 95 % {:.3f} to {:.3f} px\n", quantile(0.5), quantile(0.05),
                       quantile(0.95));
   text += "ends:";

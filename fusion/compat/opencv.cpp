@@ -133,8 +133,8 @@ class Flow : public PointFlow {
     return pixels;
   }
 
-  std::vector<Eigen::Vector2d> follow(const std::vector<Eigen::Vector2d>& from, const std::vector<Eigen::Vector2d>& guess,
-                                      double apart) override {
+  std::vector<Eigen::Vector2d> follow(const std::vector<Eigen::Vector2d>& from,
+                                      const std::vector<Eigen::Vector2d>& guess, double apart) override {
     std::vector<cv::Point2f> start, end, back;
     for (const Eigen::Vector2d& p : from) start.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()));
     for (const Eigen::Vector2d& p : guess) end.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()));

@@ -54,7 +54,8 @@ using Sampled = Eigen::Matrix<float, Patch::pixels, 1>;
 /// The image at p + A x for the patch's x, bilinear; false where a pixel lies outside.
 bool sample(const SmoothImage& image, const Eigen::Vector2d& p, const Eigen::Matrix2d& a, Sampled& out) {
   const Eigen::Vector2d reach = half * a.cwiseAbs().rowwise().sum();
-  if (!((p - reach).minCoeff() >= 0 && p.x() + reach.x() < image.width() - 1 && p.y() + reach.y() < image.height() - 1)) {
+  if (!((p - reach).minCoeff() >= 0 && p.x() + reach.x() < image.width() - 1 &&
+        p.y() + reach.y() < image.height() - 1)) {
     return false;
   }
   const Eigen::Vector2i whole = (p - reach).array().floor().cast<int>();

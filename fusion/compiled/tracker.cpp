@@ -47,11 +47,16 @@ double rivalDistance(const SmoothImage& image, const Eigen::Vector2i& pixel) {
 
 TrackEnd endOf(PatchFault fault) {
   switch (fault) {
-    case PatchFault::outside: return TrackEnd::border;
-    case PatchFault::scale: return TrackEnd::scale;
-    case PatchFault::misfit: return TrackEnd::misfit;
-    case PatchFault::uncertain: return TrackEnd::uncertain;
-    default: return TrackEnd::not_alike;
+    case PatchFault::outside:
+      return TrackEnd::border;
+    case PatchFault::scale:
+      return TrackEnd::scale;
+    case PatchFault::misfit:
+      return TrackEnd::misfit;
+    case PatchFault::uncertain:
+      return TrackEnd::uncertain;
+    default:
+      return TrackEnd::not_alike;
   }
 }
 
@@ -95,7 +100,8 @@ void Tracker::follow() {
     }
     // Older tracks come first.
     const double least = options_.apart / 2;
-    if (std::any_of(kept.begin(), kept.end(), [&](const Track& k) { return (k.match.at - match->at).norm() < least; })) {
+    if (std::any_of(kept.begin(), kept.end(),
+                    [&](const Track& k) { return (k.match.at - match->at).norm() < least; })) {
       end(track, TrackEnd::crowded);
       continue;
     }
@@ -118,8 +124,7 @@ void Tracker::begin(int width, int height) {
   std::vector<Eigen::Vector2d> taken;
   for (const Track& track : alive_) taken.push_back(track.match.at);
   const std::size_t old = alive_.size();
-  for (const Eigen::Vector2i& pixel :
-       flow_.corners(taken, options_.tracks - old, options_.apart, Patch::margin)) {
+  for (const Eigen::Vector2i& pixel : flow_.corners(taken, options_.tracks - old, options_.apart, Patch::margin)) {
     std::optional<Patch> patch = Patch::at(smooth_, pixel);
     if (!patch) continue;
     const Eigen::Vector2d at = pixel.cast<double>();
@@ -132,7 +137,11 @@ void Tracker::begin(int width, int height) {
     }
     PatchMatch match;
     match.at = at;
-    alive_.push_back({numbers_++, {rows_.size()}, std::make_unique<Patch>(std::move(*patch)), match, moved,
+    alive_.push_back({numbers_++,
+                      {rows_.size()},
+                      std::make_unique<Patch>(std::move(*patch)),
+                      match,
+                      moved,
                       rivalDistance(smooth_, pixel)});
     rows_.push_back({image_, alive_.back().number, at.x(), at.y(), 0});
   }

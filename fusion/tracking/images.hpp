@@ -41,8 +41,8 @@ class PointFlow {
   virtual void take(const GreyView& image) = 0;
   /// The strongest corners (smaller eigenvalue of the structure tensor) of the last image: at most `most` of them,
   /// whole pixels, `apart` from each other and from `taken`, `margin` from the border.
-  virtual std::vector<Eigen::Vector2i> corners(const std::vector<Eigen::Vector2d>& taken, std::size_t most, double apart,
-                                               int margin) = 0;
+  virtual std::vector<Eigen::Vector2i> corners(const std::vector<Eigen::Vector2d>& taken, std::size_t most,
+                                               double apart, int margin) = 0;
   /// Places in the last image of points of the one before, by pyramidal Lucas–Kanade from a guess, and back again.
   /// NaN where one way fails or the way back ends more than `apart` pixels from the point.
   virtual std::vector<Eigen::Vector2d> follow(const std::vector<Eigen::Vector2d>& from,

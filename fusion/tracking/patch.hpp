@@ -44,13 +44,13 @@ class SmoothImage {
 
 /// A patch as another image shows it.
 struct PatchMatch {
-  Eigen::Vector2d at = Eigen::Vector2d::Zero();              ///< px: the place of the template's central pixel
-  Eigen::Matrix2d affine = Eigen::Matrix2d::Identity();      ///< image offsets of template offsets
+  Eigen::Vector2d at = Eigen::Vector2d::Zero();                 ///< px: the place of the template's central pixel
+  Eigen::Matrix2d affine = Eigen::Matrix2d::Identity();         ///< image offsets of template offsets
   Eigen::Matrix4d affine_covariance = Eigen::Matrix4d::Zero();  ///< of the affine's rows, one after the other
   double gain = 1;
-  double noise = 0;                                          ///< grey values: of a pixel of this image, as taken
+  double noise = 0;   ///< grey values: of a pixel of this image, as taken
   double misfit = 1;  ///< the blocks' disagreement over that of noise; above 1 where it is significant
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();      ///< px², of `at`, without the template's noise
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< px², of `at`, without the template's noise
 };
 
 /// Why a patch was not found.

@@ -38,7 +38,7 @@ struct TrackedPoint {
 /// Why tracks ended.
 enum class TrackEnd { last_image, flow, border, not_alike, scale, misfit, uncertain, repeated, crowded };
 constexpr auto words(TrackEnd) {
-  return std::array{"at the last image", "lost by the flow", "at the border", "no longer alike", "out of scale",
+  return std::array{"at the last image", "lost by the flow", "at the border",   "no longer alike", "out of scale",
                     "blocks disagree",   "uncertain",        "may be a repeat", "too near another"};
 }
 inline constexpr std::size_t track_ends = 9;

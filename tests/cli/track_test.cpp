@@ -20,9 +20,9 @@
 namespace liestat::cli {
 namespace {
 
+using testing::rendered_kinds;
 using testing::RenderedKind;
 using testing::RenderedScene;
-using testing::rendered_kinds;
 
 bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
@@ -38,7 +38,7 @@ void write(const std::string& path, const std::string& text) { std::ofstream(pat
 
 /// Squares of errors over variances: against the truth of a track's first pixel, and of steps from image to image.
 struct Errors {
-  double life = 0, step = 0, far = 0, count = 0, tracks = 0;
+  double life = 0, bulk = 0, step = 0, far = 0, count = 0, tracks = 0;
 
   void add(const RenderedScene& scene, const std::vector<TrackedPoint>& track) {
     const TrackedPoint& first = track.front();
@@ -46,17 +46,19 @@ struct Errors {
     Eigen::Vector2d error_before = Eigen::Vector2d::Zero();
     for (std::size_t i = 1; i < track.size(); ++i) {
       const TrackedPoint& p = track[i];
-      const Eigen::Vector2d truth = scene.follow(pixel, first.image, p.image), error = Eigen::Vector2d(p.u, p.v) - truth;
+      const Eigen::Vector2d truth = scene.follow(pixel, first.image, p.image),
+                            error = Eigen::Vector2d(p.u, p.v) - truth;
       // The first observation's error, as this image shows it.
       double scale = 0;
       for (const Eigen::Vector2d& e : {Eigen::Vector2d(0.01, 0), Eigen::Vector2d(0, 0.01)}) {
         scale += (scene.follow(pixel + e, first.image, p.image) - truth).squaredNorm() / 2e-4;
       }
-      const double square = error.squaredNorm() / 2 / (p.sigma * p.sigma + std::min(scale, 4.) * first.sigma * first.sigma);
+      const double square =
+          error.squaredNorm() / 2 / (p.sigma * p.sigma + std::min(scale, 4.) * first.sigma * first.sigma);
       const double before = i == 1 ? first.sigma : track[i - 1].sigma;
       life += square;
       step += (error - error_before).squaredNorm() / 2 / (p.sigma * p.sigma + before * before);
-      far += square > 12.5;
+      (square > 12.5 ? far : bulk) += square > 12.5 ? 1 : square;
       ++count;
       error_before = error;
     }
@@ -85,14 +87,17 @@ TEST(Track, errorsAreAsLargeAsTheirSigmas) {
     for (const double noise : full ? std::vector<double>{2, 4, 8} : std::vector<double>{4}) {
       const Errors e = errorsOf(static_cast<RenderedKind>(kind), noise, full ? 500 : 30, full ? 2 : 1, full ? 40 : 12);
       if (full) {
-        std::printf("| %s | %g | %.0f | %.0f | %.2f | %.2f | %.2f %% |\n", rendered_kinds[kind], noise, e.tracks, e.count,
-                    e.life / e.count, e.step / e.count, 100 * e.far / e.count);
+        std::printf("| %s | %g | %.0f | %.0f | %.2f | %.2f | %.2f %% |\n", rendered_kinds[kind], noise, e.tracks,
+                    e.count, e.life / e.count, e.step / e.count, 100 * e.far / e.count);
         std::fflush(stdout);
       }
       ASSERT_GT(e.count, 100);
-      // Some 60 tracks in the short run, each with one error of its template: a standard error of 0.1.
-      EXPECT_NEAR(std::log(e.life / e.count), 0, full ? 0.35 : 0.5) << rendered_kinds[kind] << " " << noise;
+      // Some 60 tracks in the short run, each with one error of its template: a standard error of 0.1. Corners where an
+      // edge crosses the texture behind it follow neither; they are few.
+      EXPECT_NEAR(std::log(e.bulk / (e.count - e.far)), 0, full ? std::log(1.25) : 0.5)
+          << rendered_kinds[kind] << noise;
       EXPECT_NEAR(std::log(e.step / e.count), 0, 0.35) << rendered_kinds[kind] << " " << noise;
+      EXPECT_LE(e.far, 0.01 * e.count) << rendered_kinds[kind] << " " << noise;
     }
   }
 }
@@ -125,7 +130,8 @@ TEST_F(TrackFiles, areReadByMotionAndViInit) {
   std::string rows = "frame,t_s\n";
   for (int i = 0; i < 12; ++i) rows += std::to_string(i) + "," + std::to_string(100 + 0.05 * i) + "\n";
   write(times, rows);
-  const ProgramOutput result = run({"track", images, "--output", out, "--times", times, "--every", "2", "--tracks", "60"});
+  const ProgramOutput result =
+      run({"track", images, "--output", out, "--times", times, "--every", "2", "--tracks", "60"});
   ASSERT_EQ(result.exit_code, 0) << result.error;
   EXPECT_TRUE(contains(result.output, "6 images of 160 x 120")) << result.output;
   const ImageTracks tracks = readImageTracks(out, "", 0);
@@ -172,12 +178,21 @@ TEST_F(TrackFiles, areRefusedWithASentence) {
   const std::vector<std::uint8_t> black(200 * 160, 0);
   writePgm(images + "/9.pgm", {black.data(), 200, 160, 200});
   said(refused({images}), "9.pgm: it has 200 x 160 pixels, expected 160 x 120");
-  for (const char* name : {"/7.pgm", "/8.pgm", "/9.pgm", "/10.pgm"}) writePgm(images + name, {black.data(), 200, 160, 200});
+  for (const char* name : {"/7.pgm", "/8.pgm", "/9.pgm", "/10.pgm"})
+    writePgm(images + name, {black.data(), 200, 160, 200});
   said(refused({images}), "no corner");
   write(directory / "video.avi", "RIFF no video");
   said(refused({directory / "video.avi"}), "no video");
   std::filesystem::create_directory(directory / "empty");
   said(refused({directory / "empty"}), "no image in it");
+}
+
+TEST_F(TrackFiles, needAModuleThatTheProgramNames) {
+  const std::string images = folder(2), alone = directory / "liestat";
+  std::filesystem::copy_file(LIESTAT_PROGRAM, alone);
+  const ProgramResult result = runProgram({alone, "track", images, "--output", directory / "out.csv"}, ".");
+  EXPECT_EQ(result.status, 2);
+  EXPECT_TRUE(contains(result.errors, "libopencv-video-dev")) << result.errors;
 }
 
 TEST_F(TrackFiles, ofColourAnd16BitsAreConverted) {

@@ -56,7 +56,8 @@ class RenderedTexture {
     const double fu = std::floor(u), fv = std::floor(v);
     const int iu = static_cast<int>(fu), iv = static_cast<int>(fv);
     const float a = static_cast<float>(u - fu), b = static_cast<float>(v - fv);
-    return (1 - b) * ((1 - a) * at(iu, iv) + a * at(iu + 1, iv)) + b * ((1 - a) * at(iu, iv + 1) + a * at(iu + 1, iv + 1));
+    return (1 - b) * ((1 - a) * at(iu, iv) + a * at(iu + 1, iv)) +
+           b * ((1 - a) * at(iu, iv + 1) + a * at(iu + 1, iv + 1));
   }
 
  private:
@@ -139,7 +140,8 @@ class RenderedScene {
   /// Takes texels to pixels. Two texels are a pixel at the distance of 1.
   Eigen::Matrix3d planeToImage(std::size_t image, bool front) const {
     const double t = static_cast<double>(image), f = 400;
-    const double tilt = kind_ == RenderedKind::foreshortening ? 0.5 + 0.7 * (0.5 - 0.5 * std::cos(t / 20)) : 0.15 * path_[0];
+    const double tilt =
+        kind_ == RenderedKind::foreshortening ? 0.5 + 0.7 * (0.5 - 0.5 * std::cos(t / 20)) : 0.15 * path_[0];
     const Eigen::Matrix3d turned =
         (Eigen::AngleAxisd(0.2 * path_[1] + 0.01 * path_[2] * t, Eigen::Vector3d::UnitZ()) *
          Eigen::AngleAxisd(tilt, Eigen::Vector3d(std::cos(3 * path_[3]), std::sin(3 * path_[3]), 0)))
