@@ -1162,6 +1162,7 @@ class _TwoViewSuspectTest(Result):
     significant: bool  # whether
     in_group: bool  # of the suspects that can't be told from the strongest
     shift: float  # movement of the estimate per unit of the suspect, in standard deviations
+    prior_standard_deviation: float  # 0: taken for known
 
 class _TwoViewModelRow(Result):
     model: str
@@ -1213,6 +1214,7 @@ class _TwoViewMotionEstimate(Result):
 class _TwoViewStructure(Result):
     model: str
     status: str  # of the estimate from its own inliers
+    reason: str | None  # in words, where status is not ok
     inliers: int  # their number
     rms: float  # noise that its inliers show; px
     matrix: _Array  # homography or fundamental matrix of undistorted pixels, of norm 1
@@ -1222,6 +1224,10 @@ class _TwoViewStructure(Result):
     parameters: list[_PhysicalParameters]
     second_T_first: _RelativePose | None  # of the models with a pose
     curvature: str  # of the model on the scale of the noise: untested, small, widened or large
+    rivals: list[_TwoViewRival]  # where status is contested: the other models of which one may be right
+    # where status is contested: those of the chosen model that all rivals have, with a covariance that covers each
+    shared_parameters: _PhysicalParameters | None
+    suspects: list[_TwoViewSuspectTest]  # what the model takes for known of the cameras
 
 class _TwoViewMotions(Result):
     matches: int  # all that were given
