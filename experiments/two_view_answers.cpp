@@ -79,7 +79,7 @@ std::vector<AnswerScene> answerScenes(const TwoViewAnswers& validation) {
   }
   // Wrong answers that may go unmarked at a parallax of 13 times the noise, and at less and more.
   for (const auto& [baseline, wrong] : {std::pair{0.03, 0.1}, {0.05, 0.04}, {0.08, 0.01}, {0.12, 0.01}}) {
-    AnswerScene scene{fmt::format("essential, {} m", baseline), sceneOf(TwoViewMotion::essential), wrong, {}};
+    AnswerScene scene{fmt::format("pose, {:.0f} cm", 100 * baseline), sceneOf(TwoViewMotion::essential), wrong, {}};
     scene.options.min_baseline = scene.options.max_baseline = baseline;
     if (baseline >= 0.08) scene.min_in_set = 0.98;
     scenes.push_back(std::move(scene));

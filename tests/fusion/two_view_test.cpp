@@ -383,11 +383,10 @@ TEST(TwoViewMotion, parallaxOfAShortBaselineIsNotHiddenByTheNoise) {
   EXPECT_LE(unmarked, 2u);
 }
 
-TEST(TwoViewMotion, aContestedAnswerCoversEachModelOfTheSet) {
-  // 3 cm: the matches tell in half of the scenes only. Where they do not, and the truth is one of the set, the shared
-  // rotation is closer to the truth in its own deviations than that of the chosen model by its covariance. Most essential
-  // poses of such baselines are curved on the scale of their noise: then there is no covariance that covers them.
-  std::size_t contested = 0, covered = 0, covered_by_own = 0, trials = 0, withheld = 0;
+TEST(TwoViewMotion, aContestedAnswerHasNoCovarianceWhereOneOfTheSetHasNone) {
+  // 3 cm: the matches tell in half of the scenes only. Essential poses of such baselines are curved on the scale of their
+  // noise: then there is no covariance that covers them.
+  std::size_t contested = 0, withheld = 0;
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     TwoViewSceneOptions options{.motion = TwoViewMotion::essential, .outliers = 0};
     options.min_baseline = options.max_baseline = 0.03;
@@ -405,20 +404,37 @@ TEST(TwoViewMotion, aContestedAnswerCoversEachModelOfTheSet) {
         found.relative_curvature.large() || std::any_of(found.rivals.begin(), found.rivals.end(),
                                                         [](const auto& r) { return r.relative_curvature.large(); });
     EXPECT_FALSE(covariance.allFinite() && curved) << seed;
-    if (!covariance.allFinite()) {
-      ++withheld;
-      continue;
-    }
-    ++trials;
-    covered += error.dot(covariance.ldlt().solve(error)) < 16.3;
-    const Eigen::Matrix3d own = found.physical[0].covariance.topLeftCorner<3, 3>();
-    covered_by_own += error.dot(own.ldlt().solve(error)) < 16.3;
+    withheld += !covariance.allFinite();
+    // Where there is one, it holds: a region of 99.9 %.
+    EXPECT_FALSE(error.dot(covariance.ldlt().solve(error)) > 16.3) << seed;
   }
   EXPECT_GE(contested, 8u);
-  EXPECT_GE(trials + withheld, 8u);
-  EXPECT_GE(withheld, 4u);
-  EXPECT_EQ(covered, trials) << "regions of 99.9 %";
-  EXPECT_GT(covered, covered_by_own);
+  EXPECT_GE(withheld, 8u);
+}
+
+TEST(TwoViewMotion, aContestedAnswerCoversEachModelOfTheSet) {
+  // A shift, or a shift and a small turn in the image: both have the shift. The mean of a set of m over the squares of the
+  // differences d from the chosen values has dᵀ C⁻¹ d <= m, whatever the models' own covariances.
+  std::size_t trials = 0;
+  // All the contested ones of 900 scenes.
+  for (const std::uint64_t seed : {347, 547, 574, 576, 680, 694, 746, 773, 801, 979, 1074, 1080}) {
+    const TwoViewScene scene({.motion = TwoViewMotion::retinal_translation, .matches = 60, .outliers = 0}, seed);
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, optionsOf(scene));
+    if (found.status != Status::contested || !found.shared || !found.shared->covariance.allFinite()) continue;
+    if (found.shared->names != std::vector<std::string>{"shift x", "shift y"}) continue;
+    ++trials;
+    const Eigen::Matrix2d covariance = found.shared->covariance;
+    EXPECT_EQ(found.shared->values, found.physical[0].values.head<2>().eval());
+    for (const TwoViewRival& rival : found.rivals) {
+      const PhysicalParameters& other = rival.physical.at(0);
+      const auto at = std::find(other.names.begin(), other.names.end(), "shift x") - other.names.begin();
+      const Eigen::Vector2d d = other.values.segment<2>(at) - found.shared->values;
+      EXPECT_LE(d.dot(covariance.ldlt().solve(d)), static_cast<double>(found.rivals.size() + 1)) << seed;
+    }
+    const Eigen::Vector2d error = found.shared->values - truthOf(scene).head<2>();
+    EXPECT_LT(error.dot(covariance.ldlt().solve(error)), 13.8) << "99.9 %, " << seed;
+  }
+  EXPECT_GE(trials, 10u);
 }
 
 TEST(TwoViewMotion, covariancesAreOfTheNoiseThatIsShown) {
@@ -451,18 +467,20 @@ TEST(TwoViewMotion, covariancesAreOfTheNoiseThatIsShown) {
 
 TEST(TwoViewMotion, aCurvedModelHasNoCovariance) {
   // At 2 px the pose of a short way is curved on the scale of its noise: a first-order region of 95 % holds the truth
-  // in 63 to 78 %. Widened regions are to hold it: of 20 more than four fail with probability 3e-3.
+  // in 63 to 78 %. Widened regions are to hold it: of 24 more than four fail with probability 3e-3.
   std::size_t curved = 0, ok = 0, outside = 0, widened = 0;
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 24; ++seed) {
     const double sigma = seed % 2 == 0 ? 2 : 1;
     const TwoViewScene scene({.motion = TwoViewMotion::essential, .outliers = 0.1, .sigma = sigma}, 400 + seed);
     const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, optionsOf(scene));
     if (found.chosenModel().name != "essential" || !found.relative_pose) continue;
-    EXPECT_TRUE(found.relative_curvature.tested()) << seed;
-    EXPECT_EQ(found.ok(), !found.relative_curvature.large() && found.status != Status::contested) << seed;
+    const bool rests_on_few = found.reason.find("would rest on single matches") != std::string::npos;
+    EXPECT_TRUE(found.relative_curvature.tested() || rests_on_few) << seed;
+    EXPECT_EQ(found.ok(), !found.relative_curvature.large() && found.status != Status::contested && !rests_on_few)
+        << seed;
     if (found.status == Status::ill_defined) {
-      ++curved;
-      EXPECT_NE(found.reason.find("curved"), std::string::npos) << found.reason;
+      curved += !rests_on_few;
+      EXPECT_TRUE(rests_on_few || found.reason.find("curved") != std::string::npos) << found.reason;
       EXPECT_FALSE(found.relative_pose->covariance.allFinite()) << seed;
       EXPECT_FALSE(found.matrix_covariance.allFinite()) << seed;
     }

@@ -479,6 +479,14 @@ struct TwoViewInput {
   }
 };
 
+inline std::string whyNoCovariance(const std::string& model, const ModelEstimate<TwoViewMotionModel>& estimate) {
+  if (estimate.status != Status::ill_defined) return "the estimate of the chosen model did not converge";
+  if (estimate.relative_curvature.large()) {
+    return model + " is curved on the scale of the noise: no covariance of the matches would hold";
+  }
+  return "the covariance of " + model + " would rest on single matches that no other one confirms";
+}
+
 inline std::string notToldApart(const std::string& chosen, std::span<const TwoViewRival> rivals) {
   std::string text = "the matches do not tell apart " + chosen;
   for (const TwoViewRival& rival : rivals) text += (&rival == &rivals.back() ? " and " : ", ") + rival.model;
@@ -544,9 +552,7 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   if (search.progress() != HierarchyState::terminated) {
     result.status = Status::not_converged, result.reason = "the search was stopped";
   } else if (!result.ok()) {
-    result.reason = result.status == Status::ill_defined
-                        ? model.name() + " is curved on the scale of the noise: no covariance of the matches would hold"
-                        : "the estimate of the chosen model did not converge";
+    result.reason = detail::whyNoCovariance(model.name(), estimate);
   } else if (!input.fault().empty()) {
     result.status = Status::ill_defined, result.reason = input.fault();
   } else if (state.unsupported) {
@@ -622,7 +628,7 @@ LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eige
     input.describe(model, estimate, own, structure);
     structure.suspects = input.testCameras(model, estimate, own).tests;
     if (structure.status != Status::ok) {
-      structure.reason = "its estimate did not end, or no covariance would hold";
+      structure.reason = detail::whyNoCovariance(found.name, estimate);
       continue;
     }
     // A rival may have what is left to all motions.

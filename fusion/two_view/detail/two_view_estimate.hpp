@@ -43,7 +43,7 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
   options.noise = StatedNoise::trusted;  // models are compared by their χ²
   Channel matches{{inliers.begin(), inliers.end()}, {sigma}, {Equation{}}};
   ConstrainedResult<Q> found;
-  bool all_vouched_for = false;
+  bool rests_on_few = false;
   for (int pass = 0; pass < 4; ++pass) {
     ConstrainedEstimator<Q, Constraint, Channel> estimator(start, constraint, options, matches);
     while (estimator.iterate()) {
@@ -51,8 +51,8 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
     }
     const ConstrainedResult<Q>& next = estimator.result();
     const bool ended = next.ok() || next.end == ConstrainedEnd::curved;
-    // A covariance that holds by such matches alone is none.
-    if (pass > 0 && !ended && !is_final) break;
+    rests_on_few = pass > 0 && !ended;
+    if (rests_on_few && !is_final) break;
     found = next;
     if (!ended) break;
     const double mean = static_cast<double>(found.free_parameters) / found.equations;
@@ -61,13 +61,14 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
       if (estimator.leverage(i) > std::max(max_leverage, 3 * mean)) continue;
       vouched_for.measurements.push_back(matches.measurements[i]);
     }
-    all_vouched_for = vouched_for.size() == matches.size();
-    if (all_vouched_for) break;
+    rests_on_few = vouched_for.size() < matches.size();
+    if (!rests_on_few) break;
     matches.measurements = std::move(vouched_for.measurements);
   }
   ModelEstimate<TwoViewMotionModel> result;
   result.status = found.status();
-  if (is_final && result.status == Status::ok && !all_vouched_for) result.status = Status::ill_defined;
+  // A covariance that holds by such matches alone is none.
+  if (is_final && rests_on_few) result.status = Status::ill_defined;
   finish(found.parameter, result.parameter);
   result.information = found.information;
   result.covariance = found.covariance;
