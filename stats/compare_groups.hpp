@@ -25,11 +25,11 @@ namespace liestat {
 /// The comparison of groups of vectors, in rows: what compareGroups() does once features are vectors. At least two groups
 /// of one dimension d. `too_few`: a group has fewer than max(10, 4 d) rows, from where on levels were validated; fewer than
 /// d + 2 are not compared at all. `ill_defined`: a dispersion is singular.
-LIESTAT_COMPARISON_API GroupComparison compareVectors(const std::vector<Eigen::MatrixXd>& groups,
-                                                      const ComparisonOptions& options = {});
+LIESTAT_LAWS_API GroupComparison compareVectors(const std::vector<Eigen::MatrixXd>& groups,
+                                                const ComparisonOptions& options = {});
 /// The same of pairs, row by row.
-LIESTAT_COMPARISON_API GroupComparison compareVectorPairs(const Eigen::MatrixXd& first, const Eigen::MatrixXd& second,
-                                                          const ComparisonOptions& options = {});
+LIESTAT_LAWS_API GroupComparison compareVectorPairs(const Eigen::MatrixXd& first, const Eigen::MatrixXd& second,
+                                                    const ComparisonOptions& options = {});
 
 namespace detail {
 

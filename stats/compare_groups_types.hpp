@@ -1,7 +1,7 @@
 // The result of compareGroups() (stats/compare_groups.hpp): what programs and pages read.
 #pragma once
 
-#include <stats/detail/compiled.hpp>
+#include <stats/detail/compiled_laws.hpp>
 #include <stats/status.hpp>
 #include <stats/verdict.hpp>
 
@@ -12,12 +12,6 @@
 #include <limits>
 #include <string>
 #include <vector>
-
-#if defined(LIESTAT_COMPILED_LAWS)
-#define LIESTAT_COMPARISON_API
-#else
-#define LIESTAT_COMPARISON_API LIESTAT_NOT_LINKED("liestat::laws")
-#endif
 
 namespace liestat {
 
@@ -85,7 +79,7 @@ struct GroupComparison {
 
   bool ok() const { return status == Status::ok; }
   /// Yes: consistent with one mean. No: the means differ at the level. None: the status is not ok.
-  LIESTAT_COMPARISON_API Verdict verdict() const;
+  LIESTAT_LAWS_API Verdict verdict() const;
 };
 template <class V>
 void describe(V& v, const GroupComparison& x) {

@@ -16,7 +16,7 @@
 // laws are Bingham's of half angles: one contour integral normalises them all. Docs: docs/laws.md.
 #pragma once
 
-#include <stats/detail/compiled.hpp>
+#include <stats/detail/compiled_laws.hpp>
 #include <stats/status.hpp>
 #include <stats/verdict.hpp>
 #include <stats/words.hpp>
@@ -31,12 +31,6 @@
 #include <ranges>
 #include <string>
 #include <vector>
-
-#if defined(LIESTAT_COMPILED_LAWS)
-#define LIESTAT_LAWS_API
-#else
-#define LIESTAT_LAWS_API LIESTAT_NOT_LINKED("liestat::laws")
-#endif
 
 namespace liestat {
 
