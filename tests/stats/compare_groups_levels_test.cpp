@@ -71,7 +71,9 @@ void judge(const Cell& cell, std::uint32_t stream, double low = 0.04, double hig
   EXPECT_GE(rate(means), low) << cell.name;
   EXPECT_LE(rate(means), high) << cell.name;
   if (!alike || cell.away > 0) {
-    if (cell.away > 0) EXPECT_NEAR(rate(means), rate(if_alike), 0.02) << "power is not Hotelling's: " << cell.name;
+    if (cell.away > 0) {
+      EXPECT_NEAR(rate(means), rate(if_alike), 0.02) << "power is not Hotelling's: " << cell.name;
+    }
     return;
   }
   EXPECT_GE(rate(if_alike), low) << cell.name;

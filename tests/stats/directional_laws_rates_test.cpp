@@ -50,7 +50,9 @@ void judge(LawModel model, double kappa, int n) {
   EXPECT_LE(percent(outside, trials), 5 + error) << name(model) << ", " << kappa << ", " << n;
   EXPECT_LE(percent(refuted, trials), 0.1 + 400 * std::sqrt(0.001 / trials))
       << name(model) << ", " << kappa << ", " << n;
-  if (ok > trials / 2) EXPECT_GE(percent(within, ok), 93 - error) << name(model) << ", " << kappa << ", " << n;
+  if (ok > trials / 2) {
+    EXPECT_GE(percent(within, ok), 93 - error) << name(model) << ", " << kappa << ", " << n;
+  }
 }
 
 TEST(DirectionalLawsRates, okIsRight) {
