@@ -96,12 +96,14 @@ Numbered numberOf(const std::string& file) {
 /// Times of names that are nanoseconds; throws InputError for a gap in numbers.
 std::vector<double> timesOfNames(const std::vector<std::string>& files) {
   std::vector<Numbered> names;
+  names.reserve(files.size());
   for (const std::string& file : files) names.push_back(numberOf(file));
   const auto all = [&](auto&& holds) { return std::all_of(names.begin(), names.end(), holds); };
   if (all([](const Numbered& n) {
         return n.digits.size() >= stamp_digits && n.digits.size() <= largest_stamp_digits;
       })) {
     std::vector<double> times;
+    times.reserve(names.size());
     for (const Numbered& n : names) times.push_back(1e-9 * static_cast<double>(std::stoull(n.digits)));
     return times;
   }

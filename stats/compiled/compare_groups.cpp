@@ -103,6 +103,7 @@ EqualityTest unequalTest(const std::vector<Sample>& groups, const ComparisonOpti
     return test;
   }
   std::vector<MatrixXd> factors;
+  factors.reserve(groups.size());
   for (const Sample& g : groups) factors.emplace_back(g.covariance.llt().matrixL());
   std::vector<Sample> drawn = groups;
   Draws draws{options.resamples};
@@ -208,6 +209,7 @@ ComparedPair pairOf(const std::vector<Sample>& samples, std::size_t i, std::size
 
 void adjustByHolm(std::vector<ComparedPair>& pairs) {
   std::vector<ComparedPair*> order;
+  order.reserve(pairs.size());
   for (ComparedPair& pair : pairs) order.push_back(&pair);
   std::sort(order.begin(), order.end(), [](const auto* a, const auto* b) { return a->means.p < b->means.p; });
   double largest = 0;

@@ -182,17 +182,21 @@ double visitTurns(const MatrixXd& axes, const Vector3d& deviations, const Vector
   const Vector3d unit = (axes.transpose() * u).cwiseQuotient(deviations);
   const double per_angle = unit.squaredNorm(), sine = 2 * std::sin(0.5 * angle) * std::sin(0.5 * angle);
   std::array<double, 2 * most + 1> exponents{};
+  const auto placeOf = [](int turns) {
+    const int place = turns + most;
+    return static_cast<std::size_t>(place);
+  };
   double largest = -std::numeric_limits<double>::infinity();
   for (int k = -most; k <= most; ++k) {
     const double a = angle + 2 * pi * k;
     const double square = k == 0 ? (angle < 1e-8 ? 2 : angle * angle / sine) : a * a / std::max(sine, 1e-300);
     const double e = -0.5 * per_angle * a * a + std::log(square);
-    exponents[static_cast<std::size_t>(k + most)] = e, largest = std::max(largest, e);
+    exponents[placeOf(k)] = e, largest = std::max(largest, e);
   }
   double sum = 0;
   for (const double e : exponents) sum += std::exp(e - largest);
   for (int k = -most; k <= most; ++k) {
-    const double weight = std::exp(exponents[static_cast<std::size_t>(k + most)] - largest) / sum;
+    const double weight = std::exp(exponents[placeOf(k)] - largest) / sum;
     const double a = angle + 2 * pi * k;
     if (weight > 1e-18) visit(weight, Vector3d(a * unit), a, u);
   }
