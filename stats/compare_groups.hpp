@@ -10,6 +10,7 @@
 
 #include <lie/manifold.hpp>
 #include <stats/compare_groups_types.hpp>
+#include <stats/detail/compiled_laws.hpp>
 #include <stats/concentration.hpp>
 #include <stats/group_mean.hpp>
 #include <stats/mean.hpp>
@@ -84,7 +85,8 @@ inline GroupComparison withMean(GroupComparison compared, const GroupComparison&
 /// Do groups of features have one mean, and one dispersion? Beyond compareVectors(): `ill_defined` where all features
 /// together are as scattered as uniform ones, `not_converged` where they are not finite.
 template <Homogeneous M>
-GroupComparison compareGroups(const std::vector<std::vector<M>>& groups, const ComparisonOptions& options = {}) {
+LIESTAT_LAWS_API GroupComparison compareGroups(const std::vector<std::vector<M>>& groups,
+                                               const ComparisonOptions& options = {}) {
   GroupComparison result;
   const std::vector<Eigen::MatrixXd> tangents = detail::tangentGroups(groups, result);
   return tangents.empty() ? result : detail::withMean(compareVectors(tangents, options), result);
@@ -92,8 +94,8 @@ GroupComparison compareGroups(const std::vector<std::vector<M>>& groups, const C
 
 /// Do features that were measured in pairs, first[i] and second[i], have one mean? Lists of two lengths: not_applicable.
 template <Homogeneous M>
-GroupComparison comparePairs(const std::vector<M>& first, const std::vector<M>& second,
-                             const ComparisonOptions& options = {}) {
+LIESTAT_LAWS_API GroupComparison comparePairs(const std::vector<M>& first, const std::vector<M>& second,
+                                              const ComparisonOptions& options = {}) {
   GroupComparison result;
   result.paired = true;
   if (first.size() != second.size()) {

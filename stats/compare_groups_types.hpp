@@ -1,7 +1,6 @@
 // The result of compareGroups() (stats/compare_groups.hpp): what programs and pages read.
 #pragma once
 
-#include <stats/detail/compiled_laws.hpp>
 #include <stats/status.hpp>
 #include <stats/verdict.hpp>
 
@@ -79,7 +78,7 @@ struct GroupComparison {
 
   bool ok() const { return status == Status::ok; }
   /// Yes: consistent with one mean. No: the means differ at the level. None: the status is not ok.
-  LIESTAT_LAWS_API Verdict verdict() const;
+  Verdict verdict() const;
 };
 template <class V>
 void describe(V& v, const GroupComparison& x) {

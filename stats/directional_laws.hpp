@@ -101,7 +101,7 @@ struct LawFit {
 
   bool ok() const { return status == Status::ok; }
   /// Yes: the law explains the features, and its location is determined. None: too few features.
-  LIESTAT_LAWS_API Verdict verdict() const;
+  Verdict verdict() const;
   /// The standard deviation of κ_i; NaN where there is none.
   double kappaDeviation(Eigen::Index i) const {
     return i < kappa_covariance.rows() ? std::sqrt(kappa_covariance(i, i)) : std::numeric_limits<double>::quiet_NaN();
@@ -151,7 +151,7 @@ LIESTAT_LAWS_API LawFit fitLaw(LawModel model, const Eigen::Ref<const Eigen::Mat
 /// The same of a range of SO2d, S2d or SO3d; of another type than the law's, not_applicable.
 template <std::ranges::sized_range R>
   requires requires(const R& r) { std::ranges::begin(r)->params(); }
-LawFit fitLaw(LawModel model, const R& features, const LawFitOptions& options = {}) {
+LIESTAT_LAWS_API LawFit fitLaw(LawModel model, const R& features, const LawFitOptions& options = {}) {
   using M = std::ranges::range_value_t<R>;
   Eigen::MatrixXd rows(static_cast<Eigen::Index>(std::ranges::size(features)), M::num_parameters);
   Eigen::Index i = 0;
