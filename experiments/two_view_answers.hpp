@@ -10,7 +10,7 @@
 
 namespace liestat::experiments {
 
-/// What a user of estimateTwoViewMotion() is told: over the motions of the default lattice, and over poses whose
+/// The answers that a user of estimateTwoViewMotion() gets: over the motions of the default lattice, and over poses whose
 /// baselines come near the noise, how often an answer that is wrong is marked.
 struct TwoViewAnswers {
   RunSize run{.trials = 20};  ///< trials of a scene
@@ -28,9 +28,9 @@ struct TwoViewAnswerRow {
   std::size_t wrong = 0;                        ///< ok, and another model
   std::size_t contested = 0, right_in_set = 0;  ///< of the marked ones; with the right model in the set
   std::size_t right_contested = 0;              ///< contested although the right model was chosen
-  /// Of the right ones with a relative pose: those with the truth outside of the region of 95 %.
+  /// Right ones with a relative pose, and those of them with the truth outside of the region of 95 %.
   std::size_t poses = 0, outside = 0;
-  /// The largest shares of wrong answers, and the least of answers whose set has the right model; none is promised
+  /// The largest share of wrong answers, and the smallest of answers whose set has the right model; none is promised
   /// where it is absent.
   double max_wrong = 1;
   std::optional<double> min_in_set = {};

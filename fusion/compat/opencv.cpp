@@ -91,7 +91,7 @@ class Video : public ImageSequence {
   }
   bool skip() override {
     if (!capture_.grab()) return false;
-    // Of the frame that was grabbed.
+    // The stamp is that of the frame that was grabbed.
     time_ = capture_.get(cv::CAP_PROP_POS_MSEC) / 1000;
     return true;
   }

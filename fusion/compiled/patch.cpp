@@ -245,7 +245,7 @@ std::optional<PatchMatch> Patch::find(const SmoothImage& image, const Eigen::Vec
   const double mean = normal_(6, 7) / pixels, contrast = g2 * (normal_(6, 6) - pixels * mean * mean);
   if (!(left < 0.5 * contrast)) return failed(PatchFault::not_alike);
   if (variance_count_ > 0 && variance > largest_rise * known) return failed(PatchFault::not_alike);
-  // What one image has more is structure that the fit leaves, which the blocks judge.
+  // The excess in one image is structure that the fit leaves, which the blocks judge.
   variance_sum_ += variance_count_ > 0 ? std::min(variance, largest_surprise * known) : variance;
   variance_count_ += 1;
   const double usual = variance_sum_ / variance_count_;
@@ -262,7 +262,7 @@ std::optional<PatchMatch> Patch::find(const SmoothImage& image, const Eigen::Vec
     disagreement += s.dot(block_weight_[static_cast<std::size_t>(b)] * s);
   }
   const double now = disagreement / (block_mean_ * usual * (1 + g2));
-  // What no affine map explains stays from image to image, noise does not.
+  // Misfit that no affine map explains stays from image to image, noise does not.
   misfit_ += (now - misfit_) / std::min(variance_count_, misfit_memory);
   match.misfit = std::max(misfit_, now > 1 + 3 * std::sqrt(2 / block_freedom_) ? now : 0);
   if (now > largest_misfit || (variance_count_ > 2 && misfit_ > largest_mean_misfit)) return failed(PatchFault::misfit);
@@ -272,7 +272,7 @@ std::optional<PatchMatch> Patch::find(const SmoothImage& image, const Eigen::Vec
   const double ratio = slopeRatio(values, match.gain);
   Normal sloped = ratio * normal_;
   sloped.block<4, 4>(2, 2) += weight;
-  // Of place and affine alone.
+  // Rows of place and affine map alone.
   const Eigen::Matrix<double, 6, columns> gain = sloped.inverse().topRows<6>();
   const Eigen::Matrix<double, 6, 4> of_prior = gain.middleCols<4>(2) * weight;
   const double kept = interpolated(match, correlation_);

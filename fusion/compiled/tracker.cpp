@@ -148,7 +148,7 @@ void Tracker::begin(int width, int height) {
 }
 
 void Tracker::end(Track& track, TrackEnd why) {
-  // What ended it may have begun before it was seen, and a template that few images confirmed may lie on an edge of depth.
+  // The cause of its end may have begun before it was seen, and a template that few images confirmed may lie on an edge of depth.
   const bool sudden = why != TrackEnd::last_image && why != TrackEnd::border && why != TrackEnd::crowded;
   if (track.rows.size() < std::max<std::size_t>(2, std::min(options_.least, image_))) return drop(track, 0);
   if (sudden) drop(track, std::max<std::size_t>(track.rows.size() - std::min(track.rows.size(), doubtful), 1));

@@ -17,7 +17,7 @@ namespace liestat {
 struct TwoViewEdge {
   /// The translation has length one; it is zero where the camera only turned.
   SE3d second_T_first;
-  /// Of the tangent (translation, rotation) of second_T_first·Exp(e), axes of the first camera. Of a baseline it has
+  /// Its tangent is (translation, rotation) of second_T_first·Exp(e), axes of the first camera. With a baseline it has
   /// rank five, since the length is one by definition; where the camera only turned its translation is NaN: open.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   /// The inverse where it has one, zero along what images leave open; nothing of `translation`, which states that

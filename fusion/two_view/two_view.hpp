@@ -44,7 +44,7 @@ struct TwoViewMotionOptions {
   /// σ is right: errors beyond its threshold are then evidence for a more general model at once, and covariances are
   /// those of σ. Otherwise noise may be larger than stated, and the matches say by how much.
   bool noise_is_known = false;
-  /// What is known about the cameras: standard deviations of the focal lengths, relative, and of the distortion k1. The
+  /// Standard deviations of what is given about the cameras: of the focal lengths, relative, and of the distortion k1. The
   /// covariances of the motion contain them, and are then larger than those of the matches; the estimate is that of the
   /// cameras as given. Where the matches speak for cameras that this excludes, the status is inconsistent. 0 takes them
   /// for known.

@@ -98,7 +98,7 @@ struct TwoViewSuspectTest : SuspectTest {
   double prior_sigma = 0;  ///< as in the options: 0 where it is taken for known
 };
 
-/// What else may be true of a motion.
+/// Other motions and cameras that may be true instead.
 struct TwoViewAlternatives {
   /// Where the status is contested: the other models of the set of which one is right, or the second motion.
   std::vector<TwoViewRival> rivals;

@@ -83,7 +83,7 @@ LIESTAT_FUSION_INLINE MisfitSearch findTimeScale(const PoseStream& estimate, con
     return detail::agreed(estimate, reference, {factor, zero, 0, 0}, least);
   };
   const double as_is = at(1, offset, 0).agreement;
-  // Of the clocks' zeros only those that a file can have: the same one, or the beginnings of both.
+  // Only zeros of the clocks that a file can have: the same one, or the beginnings of both.
   const auto zeros = [&](double factor) { return std::array{0., offset, r.front().time - factor * e.front().time}; };
   TimeScale best;
   const auto take = [&](const TimeScale& s, double least = 0) {

@@ -222,7 +222,7 @@ inline ModelEstimate<TwoViewMotionModel> atShownNoise(const TwoViewModel& model,
     }
   }
   RelativeCurvature shown = estimate.relative_curvature.at(std::sqrt(noise));
-  // Of poses whose covariances were widened by more, every fifth was outside of its region (docs/two_view.md).
+  // Every fifth pose whose covariance was widened by more was outside of its region (docs/two_view.md).
   shown.max_widening = 9;
   estimate.covariance *= noise * shown.widening() / estimate.relative_curvature.widening();
   estimate.information /= noise;
