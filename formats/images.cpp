@@ -68,7 +68,8 @@ std::vector<std::string> filesOf(const std::vector<std::string>& paths) {
     }
     std::error_code error;
     for (const fs::directory_entry& entry : fs::directory_iterator(path, error)) {
-      if (entry.is_regular_file() && isImageName(entry.path())) files.push_back(entry.path().string());
+      std::error_code dangling;
+      if (entry.is_regular_file(dangling) && isImageName(entry.path())) files.push_back(entry.path().string());
     }
     if (error) throw InputError(path, 0, "it can't be read: " + error.message());
     if (files.empty()) throw InputError(path, 0, "there is no image in it", "two or more (png, jpg, pgm, tif, bmp …)");
@@ -174,7 +175,8 @@ std::vector<double> timesIn(const std::string& path, const std::vector<std::stri
 
 ImageRecording imagesOf(const std::vector<std::string>& paths, const std::string& times) {
   for (const std::string& path : paths) {
-    if (!fs::exists(path)) throw InputError(path, 0, "there is no such file or folder");
+    std::error_code none;
+    if (!fs::exists(path, none)) throw InputError(path, 0, "there is no such file or folder");
   }
   ImageRecording recording;
   if (paths.size() == 1 && !fs::is_directory(paths[0]) && !isImageName(paths[0])) {
@@ -223,6 +225,12 @@ ImageReader::ImageReader(const std::vector<std::string>& paths, const std::strin
   images_ = recording_.files.empty() ? library.openVideo(recording_.video) : library.openFiles(recording_.files);
   if (!images_)
     throw InputError(recording_.video, 0, "it is no video that can be read", "a video, a folder, or images");
+}
+
+bool ImageReader::reads(const std::string& path) const {
+  std::error_code none;
+  const auto is = [&](const std::string& file) { return fs::equivalent(file, path, none); };
+  return is(recording_.video) || is(times_) || std::any_of(recording_.files.begin(), recording_.files.end(), is);
 }
 
 GreyView ImageReader::next() {

@@ -41,6 +41,8 @@ class ImageReader {
   std::size_t frame() const { return frame_; }
   /// s; NaN where no times are known.
   double time() const { return time_; }
+  /// True of a file that is one of those to read.
+  bool reads(const std::string& path) const;
   /// How many images there are, passed-over ones too; 0: not known.
   std::size_t count() const { return recording_.files.empty() ? recording_.times.size() : recording_.files.size(); }
 

@@ -48,6 +48,9 @@ Groups groupsBy(const std::string& column, const TextFile& text, const FeatureFi
     }
     if (row >= file.size() || file.lines[row] != lines.number()) continue;
     if (at >= fields.size()) throw InputError(text.name, lines.number(), "no field of the column " + column);
+    if (fields[at].empty()) {
+      throw InputError(text.name, lines.number(), "the column " + column + " is empty", "the name of the row's group");
+    }
     const auto known = std::find(groups.names.begin(), groups.names.end(), fields[at]);
     const auto group = static_cast<std::size_t>(known - groups.names.begin());
     if (known == groups.names.end()) groups.names.emplace_back(fields[at]), groups.rows.emplace_back();

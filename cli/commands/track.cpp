@@ -37,6 +37,9 @@ struct TrackedImages {
 
 TrackedImages trackImages(const TrackCommandOptions& options) {
   ImageReader images(options.paths, options.times, options.every, track_name);
+  if (images.reads(options.output)) {
+    throw OptionError(track_name, "--output " + options.output + ", which is read", "another file");
+  }
   const std::unique_ptr<PointFlow> flow = imageLibrary(track_name).pointFlow();
   Tracker tracker(*flow, options.how);
   TrackedImages result;

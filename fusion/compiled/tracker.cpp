@@ -150,10 +150,12 @@ void Tracker::begin(int width, int height) {
 void Tracker::end(Track& track, TrackEnd why) {
   // The cause of its end may have begun before it was seen, and a template that few images confirmed may lie on an edge of depth.
   const bool sudden = why != TrackEnd::last_image && why != TrackEnd::border && why != TrackEnd::crowded;
-  if (track.rows.size() < std::max<std::size_t>(2, std::min(options_.least, image_))) return drop(track, 0);
-  if (sudden) drop(track, std::max<std::size_t>(track.rows.size() - std::min(track.rows.size(), doubtful), 1));
+  const std::size_t seen = track.rows.size(), kept = sudden ? seen - std::min(seen, doubtful) : seen;
+  if (kept < 2) return drop(track, 0);
+  drop(track, kept);
   rows_[track.rows.front()].sigma = sigmaOf(track.patch->templateCovariance());
-  ++ends_[static_cast<std::size_t>(why)];
+  ended_.resize(std::max(ended_.size(), track.number + 1));
+  ended_[track.number] = {seen, why};
 }
 
 /// Takes the observations after the first so many away.
@@ -166,7 +168,12 @@ std::vector<TrackedPoint> Tracker::finish() {
   alive_.clear();
   std::vector<TrackedPoint> rows = std::move(rows_);
   rows_.clear();
-  std::erase_if(rows, [](const TrackedPoint& p) { return p.sigma == 0; });
+  // How many images there are is known only now.
+  const std::size_t least = std::min(options_.least, image_);
+  std::erase_if(rows, [&](const TrackedPoint& p) { return p.sigma == 0 || ended_[p.track].seen < least; });
+  for (const Ended& track : ended_) {
+    if (track.seen >= std::max<std::size_t>(least, 1)) ++ends_[static_cast<std::size_t>(track.why)];
+  }
   std::sort(rows.begin(), rows.end(), [](const TrackedPoint& a, const TrackedPoint& b) {
     return std::pair(a.image, a.track) < std::pair(b.image, b.track);
   });

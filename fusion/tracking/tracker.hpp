@@ -49,11 +49,11 @@ class Tracker {
 
   /// Takes the next image, of one size with the others.
   void take(const GreyView& image);
-  /// Ends all tracks. Observations by images, then tracks; those of two observations or more.
+  /// Ends all tracks. Observations by images, then tracks; those that enough images showed, with two observations or more.
   std::vector<TrackedPoint> finish();
 
   std::size_t alive() const { return alive_.size(); }
-  /// How many tracks of two observations or more ended so, by TrackEnd.
+  /// How many of these tracks ended so, by TrackEnd, after finish().
   const std::array<std::size_t, track_ends>& ends() const { return ends_; }
 
  private:
@@ -66,6 +66,11 @@ class Tracker {
     double rival;  ///< px to the nearest place that looks alike; 0: none
   };
 
+  struct Ended {
+    std::size_t seen = 0;  ///< images that showed it; 0: it has no observations left
+    TrackEnd why = TrackEnd::last_image;
+  };
+
   void follow();
   void begin(int width, int height);
   void end(Track& track, TrackEnd why);
@@ -76,6 +81,7 @@ class Tracker {
   SmoothImage smooth_;
   std::vector<Track> alive_;
   std::vector<TrackedPoint> rows_;
+  std::vector<Ended> ended_;  ///< by the numbers of the tracks
   std::array<std::size_t, track_ends> ends_{};
   std::size_t image_ = 0, numbers_ = 0, looked_ = 0;
 };

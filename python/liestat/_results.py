@@ -289,7 +289,9 @@ class MeanResult:
     def _part(self, answer, name):
         """A part of one mean."""
         if name in self._features:
-            return self._kind._of(answer["_values"][name])
+            params = answer["_values"][name]
+            # There is no mean of nothing.
+            return self._kind._of(np.full_like(params, np.nan) if name == "mean" and answer["n"] == 0 else params)
         if name in self._values:
             return answer["_values"][name]
         if name == "law":

@@ -191,8 +191,9 @@ def mean(
         lists the features that the noise of the others does not explain, with family-wise p. A covariance needs 20
         features whose outliers are not on one side: else it is withheld, with status 'inconsistent'.
     nan_policy : {'raise', 'omit'}
-        What becomes of features that are not finite, as `fuse` returns them where it refuses: an error, or they are left
-        out with their weights, covariances, times and labels. Indices of features count those that are left.
+        What becomes of features that are not finite, or that have a weight, time or covariance that is not, as `fuse`
+        returns where it refuses: an error, or they are left out with all that belongs to them. Indices of features
+        count those that are left.
 
     Returns
     -------
@@ -229,6 +230,11 @@ def mean(
         raise ValueError("mean: by: labels reduce all axes; no axis or keepdims")
     if nan_policy not in ("raise", "omit"):
         raise ValueError(f"mean: nan_policy: expected 'raise' or 'omit', got {nan_policy!r}")
+    if nan_policy == "omit":
+        x, marked = _marked(
+            x, weights=weights, covariances=covariances, factors=factors, deviations=deviations, times=times
+        )
+        weights, covariances, factors, deviations, times = marked.values()
     kind, criterion, groups, lead = _requests(
         "mean",
         x,
@@ -319,6 +325,27 @@ def _finite(group):
     kept = np.isfinite(group["features"]).all(axis=-1)
     lists = ("features", "weights", "covariances", "times")
     return dict(group, **{name: group[name][kept] for name in lists if len(group[name]) == len(kept)})
+
+
+def _marked(x, **arrays):
+    """The features, not finite where something that belongs to them is not, and what belongs to them, finite."""
+    x = require_manifold(x, "mean")
+    bad = np.zeros(x.shape, dtype=bool)
+    tails = {"covariances": 2, "factors": 2, "deviations": 1}
+    for name, value in arrays.items():
+        if value is None:
+            continue
+        a = as_numbers(value, f"mean: {name}", (x.dof,) * tails.get(name, 0))
+        tail = tuple(range(-tails.get(name, 0), 0))
+        wrong = ~np.isfinite(a).all(axis=tail)
+        try:
+            bad |= wrong
+        except ValueError:
+            raise ValueError(f"mean: {name}, shape {a.shape}: does not broadcast to the features' {x.shape}") from None
+        filler = np.eye(x.dof) if len(tail) == 2 else 1.0
+        arrays[name] = np.where(wrong[(..., *[None] * len(tail))], filler, a)
+    params = np.where(bad[..., None], np.nan, x.params)
+    return type(x)._of(params), arrays
 
 
 def _by_label(group, by, shape):
@@ -651,6 +678,9 @@ def compare(*groups, by=None, paired=False, level=0.05, seed=1):
         labels = np.asarray(by)
         if len(groups) != 1 or labels.shape != groups[0].shape:
             raise ValueError("compare: by: expected one array of features and a label for each")
+        missing = [i for i, label in enumerate(labels.tolist()) if label is None or label != label or label == ""]
+        if missing:
+            raise ValueError(f"compare: by: {len(missing)} labels are missing, the first at index {missing[0]}")
         order = list(dict.fromkeys(labels.tolist()))
         groups, names = [groups[0][labels == label] for label in order], [str(label) for label in order]
     if len(groups) < 2 or any(type(x) is not type(groups[0]) or x.ndim != 1 for x in groups):

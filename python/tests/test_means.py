@@ -214,7 +214,26 @@ class Means(unittest.TestCase):
         labels = np.broadcast_to(np.arange(2).repeat(3), (4, 6))
         self.assertEqual(liestat.mean(x, by=labels, nan_policy="omit").n.tolist(), [11, 11])
         with self.assertWarns(UserWarning):
-            self.assertEqual(liestat.mean(liestat.SO3._of(np.full((3, 4), np.nan)), nan_policy="omit").status, "too_few")
+            nothing = liestat.mean(liestat.SO3._of(np.full((3, 4), np.nan)), nan_policy="omit")
+        self.assertEqual(nothing.status, "too_few")
+        self.assertTrue(np.isnan(nothing.mean.params).all())
+
+    def test_features_whose_covariances_are_not_finite_are_left_out_if_asked(self):
+        x = liestat.R3(0.1 * np.random.default_rng(4).normal(size=(30, 3)))
+        c = np.broadcast_to(0.01 * np.eye(3), (30, 3, 3)).copy()
+        c[4] = np.nan
+        kept = np.arange(30) != 4
+        right = liestat.mean(liestat.R3(x.params[kept]), covariances=c[kept])
+        found = liestat.mean(x, covariances=c, nan_policy="omit")
+        self.assertEqual(found.n, 29)
+        np.testing.assert_array_equal(found.mean.params, right.mean.params)
+        with self.assertRaisesRegex(ValueError, "not finite at index"):
+            liestat.mean(x, covariances=c)
+        deviations = np.full((30, 3), 0.1)
+        deviations[7, 1] = np.inf
+        self.assertEqual(liestat.mean(x, deviations=deviations, nan_policy="omit").n, 29)
+        weights = np.where(np.arange(30) < 3, np.nan, 1.0)
+        self.assertEqual(liestat.mean(x, weights=weights, nan_policy="omit").n, 27)
 
     def test_lists_and_keepdims(self):
         """Lists of elements, SciPy's rotations and lists of them are arrays; keepdims keeps the reduced axes."""

@@ -709,10 +709,14 @@ void setCovariances(const Core& core, const Reference& reference, LawFit& fit) {
       variances << variance(one), variance(other);
     }
   }
+  // Fits of nearly uniform features that pass for a law are those whose features lie closer together than it has them.
+  constexpr double chosen = 3.4;
+  const double unselected = 1 - std::min(chosen / fit.uniformity.statistic, 0.5);
+  variances /= unselected;
   fit.location_covariance = directions * variances.asDiagonal() * directions.transpose();
   if (model == LawModel::vmf) {
     // Given R the mean direction has Fisher's law with κ R; where that is large this is Fisher's α95.
-    const double pull = core.law.kappa[0] * n * fit.mean_resultant;
+    const double pull = unselected * core.law.kappa[0] * n * fit.mean_resultant;
     const double half_square = 0.5 * n * std::expm1(std::log(20) / (n - 1)) / pull;
     fit.confidence_angles = {half_square < 1 ? 2 * std::asin(std::sqrt(half_square)) : pi};
     return;

@@ -141,6 +141,11 @@ TEST_F(TrackFiles, areReadByMotionAndViInit) {
   EXPECT_TRUE(tracks.has_sigmas);
   EXPECT_GT(tracks.track_ids.size(), 15U);
   for (const PixelObservation& o : tracks.observations) EXPECT_TRUE(o.sigma > 0.001 && o.sigma < 1) << o.line;
+  // All tracks were seen in all six images, as --least of eight asks where there are fewer.
+  std::map<std::size_t, std::size_t> seen;
+  for (const PixelObservation& o : tracks.observations) ++seen[o.track];
+  for (const auto& [track, images_of_it] : seen) EXPECT_GE(images_of_it, 2U) << track;
+  EXPECT_GT(seen.size(), 15U);
   // The column is used unless --sigma is given.
   const auto motion = [&](const std::string& file, std::vector<std::string> more) {
     std::vector<std::string> command{"motion", file, "--intrinsics", "400,400,80,60", "--output", "-"};
@@ -165,6 +170,11 @@ TEST_F(TrackFiles, areRefusedWithASentence) {
   };
   said(refused({directory / "nowhere"}), "there is no such file");
   said(refused({images + "/7.pgm"}), "there is one image");
+  const std::string before = contentOf(images + "/7.pgm");
+  const ProgramOutput over = run({"track", images, "--output", images + "/7.pgm"});
+  EXPECT_EQ(over.exit_code, 2);
+  said(over, "which is read");
+  EXPECT_EQ(contentOf(images + "/7.pgm"), before);
   said(refused({images + "/7.pgm", images + "/7.pgm"}), "given twice");
   write(directory / "times.csv", "frame,t_s\n0,1\n1,2\n2,3\n");
   said(refused({images}, {"--times", directory / "times.csv"}), "3 times of 4 images");

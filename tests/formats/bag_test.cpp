@@ -153,7 +153,10 @@ TEST(Bag, freshBagsOfRos2) {
 /// A whole number of n bytes.
 std::string bytes(std::uint64_t value, int n, bool big = false) {
   std::string text;
-  for (int i = 0; i < n; ++i) text += static_cast<char>(value >> 8 * (big ? n - 1 - i : i));
+  for (int i = 0; i < n; ++i) {
+    const int place = big ? n - 1 - i : i;
+    text += place < 8 ? static_cast<char>(value >> 8 * place) : '\0';
+  }
   return text;
 }
 std::string text4(const std::string& text) { return bytes(text.size(), 4) + text; }

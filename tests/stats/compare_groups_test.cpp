@@ -177,6 +177,29 @@ TEST(CompareGroups, pairsSeeWhatGroupsDoNot) {
   EXPECT_EQ(comparePairs(first, second).status, Status::not_applicable);
 }
 
+// Skewed noise, equal means: a small group beside a large one is called different in 14 % and more.
+TEST(CompareGroups, skewedGroupsOfUnequalSizesHaveNoVerdict) {
+  const auto exponential = [](Eigen::Index n, CounterRng& rng) {
+    Eigen::MatrixXd rows(n, 3);
+    for (double& x : rows.reshaped()) x = -std::log(rng.uniform()) - 1;
+    return rows;
+  };
+  int marked = 0, equal_sizes = 0, normal = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    CounterRng rng(900 + seed);
+    const GroupComparison skewed = compareVectors({exponential(12, rng), exponential(500, rng)});
+    marked += skewed.status == Status::inconsistent;
+    EXPECT_EQ(skewed.ok(), skewed.reason.find("skewed") == std::string::npos);
+    equal_sizes += compareVectors({exponential(12, rng), exponential(12, rng)}).ok();
+    normal += compareVectors({normals(12, 3, 1, rng), normals(500, 3, 1, rng)}).ok();
+  }
+  EXPECT_EQ(marked, 20);
+  EXPECT_EQ(equal_sizes, 20);
+  EXPECT_EQ(normal, 20);  // .001 each
+  CounterRng rng(950);
+  EXPECT_EQ(compareVectorPairs(exponential(60, rng), Eigen::MatrixXd::Zero(60, 3)).status, Status::inconsistent);
+}
+
 TEST(CompareGroups, refusals) {
   CounterRng rng(8);
   const std::vector<SO3d> some = around(SO3d(), 20, 0.2, rng);
