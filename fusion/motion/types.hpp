@@ -68,7 +68,7 @@ struct MotionFlags {
   bool standstill = false;      ///< a rotation alone explains the flow: the frame says nothing of the direction
   bool degenerate = false;      ///< the direction is hardly determined: a standard deviation above `degenerate_sigma`
   bool ambiguous = false;       ///< another direction explains the frames nearly as well
-  bool undecided_sign = false;  ///< the depths do not tell V from -V yet
+  bool undecided_sign = false;  ///< the depths do not tell V from -V, or too many points would be behind the camera
   bool lost =
       false;  ///< the normalised innovation was above its bound over `lost_frames` frames; hypotheses start anew
   /// The frames' χ² refutes the motion at the stated noise: wrong pairs, a second object, a larger sigma, or a motion

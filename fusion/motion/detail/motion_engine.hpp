@@ -28,6 +28,10 @@ inline constexpr double reversal_sigmas = 8;
 /// and the standard deviations by which a rival must then be worse.
 inline constexpr double largest_plane_misfit = 1.35, plane_rival_sigmas = 6;
 
+/// Share of the pairs that may lie behind the camera, each by four standard deviations of the noise that the frames show,
+/// where the sign of the direction passes for decided.
+inline constexpr double largest_share_behind = 0.15;
+
 /// The state besides the direction.
 enum class MotionState { direction, gyroscope_bias, rotation, rotation_and_bias };
 constexpr bool keepsTheRotation(MotionState state) {
@@ -64,6 +68,8 @@ struct DirectionCandidate {
   Eigen::Vector3d from_gyroscope = Eigen::Vector3d::Zero();         ///< rotation of the images minus the gyroscope's,
   Eigen::Matrix3d gyroscope_information = Eigen::Matrix3d::Zero();  ///< and its inverse covariance; 0: none
   std::size_t inliers = 0;
+  double behind = 0;          ///< share of them that this direction puts behind the camera,
+  double usually_behind = 0;  ///< and its mean over four frames or so
 
   void copyFromWhole() {
     wide.gain = whole.gain.topLeftCorner<5, 5>();
@@ -138,6 +144,7 @@ class MotionEngine {
   double gapOfChance(const DirectionCandidate& candidate, const DirectionCandidate& best, double sigmas) const;
   double mixedDepths(const Evaluation& e) const;
   double planeMisfit(const Evaluation& e) const;
+  double behindTheCamera(const Evaluation& e) const;
   void compareWithGyroscope(DirectionCandidate& candidate, const Evaluation& e) const;
   void followProcessNoise();
   void judgeFit();

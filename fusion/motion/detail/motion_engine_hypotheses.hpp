@@ -113,6 +113,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::weighSign(DirectionCandidate& c) const 
   turnDirection<8>(c.whole.gain, T), turnDirection<8>(c.whole.reported, T);
   c.direction = opposite;
   c.evidence = -c.evidence, c.depth = -c.depth;
+  c.behind = std::min(c.behind, 1 - c.behind), c.usually_behind = c.behind;
 }
 
 LIESTAT_FUSION_INLINE void MotionEngine::advanceAll() {

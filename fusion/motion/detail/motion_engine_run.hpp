@@ -156,7 +156,9 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
     out.degrees_of_freedom = static_cast<int>(c.inliers) - (free_rotation ? 3 : 0);
   }
   out.sign_evidence = c.evidence_variance > 0 ? c.evidence / std::sqrt(c.evidence_variance) : 0;
-  out.flags.undecided_sign = !(out.sign_evidence >= options_.min_sign_evidence) || c.against > reversal_likely;
+  const bool many_behind = used && std::max(c.behind, c.usually_behind) > largest_share_behind;
+  out.flags.undecided_sign =
+      !(out.sign_evidence >= options_.min_sign_evidence) || c.against > reversal_likely || many_behind;
   out.flags.outliers = used && out.inliers < out.pairs;
 
   // A rival is another place, not one within the noise of the best.

@@ -203,6 +203,27 @@ LIESTAT_FUSION_INLINE double MotionEngine::planeMisfit(const Evaluation& e) cons
   return degrees > 0 && std::isfinite(rest) ? rest / degrees : std::numeric_limits<double>::infinity();
 }
 
+/// Share of the points that the direction of the best hypothesis puts behind the camera by more than four standard deviations of the
+/// noise that the last frames show, where that is less than the stated one: tracks of other things that move, or of all
+/// that does not where the direction is that of such things. The mean depth does not show them: it follows the near.
+LIESTAT_FUSION_INLINE double MotionEngine::behindTheCamera(const Evaluation& e) const {
+  if (candidates_.size() > 1 || !options_.positive_depth || options_.outliers) return 0;
+  std::array<double, fit_frames> fits;
+  std::size_t frames = 0;
+  for (const FrameFit& fit : fits_) {
+    if (fit.degrees > 0) fits[frames++] = fit.chi_squared / fit.degrees;
+  }
+  std::nth_element(fits.begin(), fits.begin() + frames / 2, fits.begin() + frames);
+  const double scale = frames > 0 ? std::min(fits[frames / 2], 1.0) : 1;
+  std::size_t behind = 0;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (!(rows_[i].weight > 0)) continue;
+    const double along = flowResidual(points_[i], rows_[i], e.Omega).along;
+    behind += along < 0 && rows_[i].weight * along * along > 16 * scale ? 1U : 0U;
+  }
+  return behind > 2 ? static_cast<double>(behind) / static_cast<double>(e.inliers) : 0;
+}
+
 /// The rotation that the images alone say, direction and rotation both free, minus the gyroscope's.
 LIESTAT_FUSION_INLINE void MotionEngine::compareWithGyroscope(DirectionCandidate& c, const Evaluation& e) const {
   c.gyroscope_information.setZero();
@@ -242,7 +263,8 @@ bool MotionEngine::step(DirectionCandidate& c, FilterCovariance<double, D>& P, c
   c.cost = frame.cost;
   compareWithGyroscope(c, e);
   c.plane_misfit = planeMisfit(e);
-  c.inliers = e.inliers;
+  c.inliers = e.inliers, c.behind = behindTheCamera(e);
+  c.usually_behind += 0.25 * (c.behind - c.usually_behind);
   const double cost = (options_.outliers ? e.capped_cost : frame.cost) + mixedDepths(e);
   c.score += cost;
   c.costs[updates_ % DirectionCandidate::remembered] = cost;
