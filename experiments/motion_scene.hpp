@@ -44,6 +44,23 @@ inline const char* nameOf(MotionWorld world) {
   return names[static_cast<std::size_t>(world)];
 }
 
+/// Something that the filters are not told.
+enum class MotionUpset {
+  none,
+  second_object,  ///< every fifth point follows another motion of the same size
+  reversal,       ///< V becomes -V at frame 50
+  turning,        ///< V turns by 0.3 degrees a frame about one axis, and Ω stays
+  wrong_sign,     ///< the gyroscope's readings are the rotation's with the other sign
+  dead            ///< the gyroscope's readings are zero
+};
+inline constexpr std::array all_motion_upsets = {MotionUpset::none,       MotionUpset::second_object,
+                                                 MotionUpset::reversal,   MotionUpset::turning,
+                                                 MotionUpset::wrong_sign, MotionUpset::dead};
+inline const char* nameOf(MotionUpset upset) {
+  constexpr const char* names[] = {"none", "second_object", "reversal", "turning", "wrong_sign", "dead"};
+  return names[static_cast<std::size_t>(upset)];
+}
+
 struct MotionSceneOptions {
   MotionWorld world = MotionWorld::orbit;
   std::size_t points = 20;
@@ -54,6 +71,7 @@ struct MotionSceneOptions {
   double gyroscope_sigma = 0;              ///< degrees per frame and axis; 0: none
   double gyroscope_bias = 0;               ///< degrees per frame, standard deviation of each axis
   double focal_length = 500, width = 512;  ///< px
+  MotionUpset upset = MotionUpset::none;
 };
 
 /// One point of a frame.
@@ -87,6 +105,15 @@ class MotionScene {
         wrong_(seed, trial, 2),
         inertial_(seed, trial, 3) {
     drawMotion();
+    if (options.upset == MotionUpset::turning) {
+      const Eigen::Vector3d turn = 0.3 * units::degree * velocity.unitOrthogonal();
+      turn_ = SO3d::exp(turn).matrix();
+    }
+    if (options.upset == MotionUpset::second_object) {
+      const Eigen::Vector3d Omega = options.rotation * units::degree * world_.unitVector<3>();
+      const Eigen::Vector3d V = velocity.norm() * world_.unitVector<3>();
+      second_ = {SO3d::exp(Omega).matrix(), SO3d::leftJacobian(Omega) * V};
+    }
     for (std::size_t i = 0; i < options.points; ++i) tracks.push_back(freshTrack(motionOf(1)));
     observed = tracks;
     const double s = options.gyroscope_bias * units::degree;
@@ -111,11 +138,15 @@ class MotionScene {
   /// The next frame. Every track of a frame is seen in the next one too: there are `points` pairs in each interval.
   void advance() {
     ++frame;
+    if (options.upset == MotionUpset::reversal && frame == 50) velocity = -velocity;
+    if (options.upset == MotionUpset::turning) velocity = turn_ * velocity;
     rotation = rotationOf(frame);
     translation = SO3d::leftJacobian(rotation) * velocity;
-    const Motion now = motionOf(frame), next = motionOf(frame + 1);
+    const Motion common = motionOf(frame), common_next = motionOf(frame + 1);
     pairs.clear(), pair_tracks.clear(), depths.clear(), inlier.clear(), observed.clear();
     for (MotionTrack& track : tracks) {
+      const bool other = options.upset == MotionUpset::second_object && pairs.size() % 5 == 0;
+      const Motion &now = other ? second_ : common, &next = other ? second_ : common_next;
       if (options.world == MotionWorld::plane) track = freshTrack(now);
       const MotionTrack before = track;
       track.position = now(track.position);
@@ -138,6 +169,8 @@ class MotionScene {
     const double s = options.gyroscope_sigma * units::degree;
     const Eigen::Vector3d unit = inertial_.normalVector<3>();
     gyroscope.rotation = rotation + bias + s * unit;
+    if (options.upset == MotionUpset::wrong_sign) gyroscope.rotation = -gyroscope.rotation;
+    if (options.upset == MotionUpset::dead) gyroscope.rotation.setZero();
     gyroscope.covariance = s * s * Eigen::Matrix3d::Identity();
   }
 
@@ -214,6 +247,8 @@ class MotionScene {
   CounterRng world_, noise_, wrong_, inertial_;
   Eigen::Vector3d axis_ = Eigen::Vector3d::UnitX(), second_axis_ = Eigen::Vector3d::UnitY(),
                   plane_ = Eigen::Vector3d::UnitZ();
+  Eigen::Matrix3d turn_ = Eigen::Matrix3d::Identity();
+  Motion second_{Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()};
   std::size_t next_track_ = 0;
 };
 

@@ -30,6 +30,7 @@ struct Trial {
   std::array<double, 3> error{}, consistency{};
   int converged = 0;  ///< first frame from which on the error stays below 10°; 0: none
   bool usable = false;
+  double usable_frames = 0, wrong_frames = 0;  ///< shares of the frames from the first of motion_frames on
 };
 
 /// A filter behind one interface.
@@ -148,6 +149,9 @@ std::unique_ptr<Runner> runnerOf(const MotionRow& row, const MotionScene& scene,
     case MotionMethod::essential_bias:
       options.estimate_bias = true, options.bias_sigma = row.scene.gyroscope_bias * degree;
       return std::make_unique<FilterRunner<EssentialFilter>>(EssentialFilter(options));
+    case MotionMethod::upset:
+      options.outliers = false;
+      [[fallthrough]];
     case MotionMethod::composition:
       return std::make_unique<FilterRunner<MotionFilter>>(MotionFilter(options));
     case MotionMethod::intervals:
@@ -181,6 +185,10 @@ Trial runTrial(const MotionRow& row, const MotionValidation& validation, std::ui
       trial.converged = 0;
     } else if (trial.converged == 0) {
       trial.converged = frame;
+    }
+    if (frame >= motion_frames.front()) {
+      const double of = 1. / (motion_frames.back() - motion_frames.front() + 1);
+      trial.usable_frames += e.ok() ? of : 0, trial.wrong_frames += e.ok() && !(error < motion_success) ? of : 0;
     }
     if (frame != motion_frames[next]) continue;
     trial.error[next] = error;
@@ -216,6 +224,13 @@ MotionRow summarised(MotionRow row, const std::vector<Trial>& trials) {
   }
   row.convergence = quantile(converged, 0.5);
   row.coverage = std::isnan(row.consistency.back()) ? nothing : covered / static_cast<double>(row.successes.back());
+  const auto meanOf = [&](double Trial::*share, double& mean, double& error) {
+    double sum = 0, squares = 0;
+    for (const Trial& trial : trials) sum += trial.*share, squares += trial.*share * (trial.*share);
+    mean = sum / n, error = std::sqrt(std::max(squares / n - mean * mean, 0.0) / n);
+  };
+  meanOf(&Trial::usable_frames, row.usable_frames, row.usable_error);
+  meanOf(&Trial::wrong_frames, row.wrong_frames, row.wrong_error);
   row.usable = usable / n, row.usable_wrong = usable > 0 ? wrong / usable : 0;
   return row;
 }
@@ -227,6 +242,7 @@ struct PromisedCell {
   double sigma, rotation, gyroscope, bias, outliers;
   std::size_t points;
   MotionPromise promise;
+  MotionUpset upset = MotionUpset::none;
 };
 using M = MotionMethod;
 using W = MotionWorld;
@@ -313,12 +329,21 @@ constexpr PromisedCell promised_cells[] = {
     {M::essential_bias, W::general, 1, 5, 0.1, 0.115, 0, 20, {{0.99, 0.99, 0.99}, {0.79, 0.61, 0.56}, 0.95}},
     {M::essential_bias, W::general, 4, 5, 0.1, 0.115, 0, 20, {{0.99, 0.99, 0.99}, {2.2, 1.84, 1.59}, 0.95}},
     {M::essential_bias, W::general, 8, 5, 0.1, 0.115, 0, 20, {{0.97, 0.97, 0.97}, {3.73, 3.03, 2.65}, 0.95}},
+    {M::upset, W::general, 1, 5, 0, 0, 0, 20, {.usable_frames = 0.97, .wrong_frames = 0.005}},
+    {M::upset, W::general, 1, 5, 0, 0, 0.1, 20, {.usable_frames = 0, .wrong_frames = 0.005}},
+    {M::upset, W::general, 1, 5, 0, 0, 0, 20, {.usable_frames = 0, .wrong_frames = 0.01}, MotionUpset::second_object},
+    {M::upset, W::general, 1, 5, 0, 0, 0, 20, {.usable_frames = 0.85, .wrong_frames = 0.0175}, MotionUpset::reversal},
+    {M::upset, W::general, 1, 5, 0, 0, 0, 20, {.usable_frames = 0.9, .wrong_frames = 0.01}, MotionUpset::turning},
+    {M::upset, W::general, 1, 5, 0.1, 0, 0, 20, {.usable_frames = 0.97, .wrong_frames = 0.005}},
+    {M::upset, W::general, 1, 5, 0.1, 0, 0, 20, {.usable_frames = 0, .wrong_frames = 0.005}, MotionUpset::wrong_sign},
+    {M::upset, W::general, 1, 5, 0.1, 0, 0, 20, {.usable_frames = 0, .wrong_frames = 0.005}, MotionUpset::dead},
 };
 std::optional<MotionPromise> promiseOf(MotionMethod method, const MotionSceneOptions& scene) {
   for (const PromisedCell& cell : promised_cells) {
     if (cell.method == method && cell.world == scene.world && cell.sigma == scene.sigma &&
         cell.rotation == scene.rotation && cell.gyroscope == scene.gyroscope_sigma &&
-        cell.bias == scene.gyroscope_bias && cell.outliers == scene.outliers && cell.points == scene.points) {
+        cell.bias == scene.gyroscope_bias && cell.outliers == scene.outliers && cell.points == scene.points &&
+        cell.upset == scene.upset) {
       return cell.promise;
     }
   }
@@ -326,7 +351,7 @@ std::optional<MotionPromise> promiseOf(MotionMethod method, const MotionSceneOpt
 }
 
 std::size_t testsOf(const MotionPromise& promise) {
-  std::size_t tests = promise.coverage > 0 ? 1 : 0;
+  std::size_t tests = (promise.coverage > 0 ? 1U : 0U) + (promise.wrong_frames > 0 ? 2U : 0U);
   for (std::size_t k = 0; k < 3; ++k) tests += (promise.success[k] > 0 ? 1U : 0U) + (promise.median[k] > 0 ? 1U : 0U);
   return tests;
 }
@@ -354,16 +379,24 @@ void judge(MotionRow& row, const std::vector<Trial>& trials, double false_alarm)
         static_cast<std::size_t>(std::lround(row.coverage * static_cast<double>(row.successes.back())));
     if (!kept(covered, row.successes.back(), row.promise->coverage)) fail("covariance too small");
   }
+  if (row.promise->wrong_frames > 0) {
+    // Frames of a trial depend on one another: the mean of the trials is judged.
+    const double errors = twoSidedNormalQuantile(2 * false_alarm);
+    if (row.wrong_frames - errors * row.wrong_error > row.promise->wrong_frames) {
+      fail("too many usable frames are wrong");
+    }
+    if (row.usable_frames + errors * row.usable_error < row.promise->usable_frames) fail("too few usable frames");
+  }
   row.passed = row.reason.empty();
 }
 
 }  // namespace
 
 std::string name(MotionMethod method) {
-  constexpr const char* names[] = {"subspace",     "single_start",   "forward",          "discrete",
-                                   "gauss_newton", "released",       "near_start",       "search",
-                                   "essential",    "essential_near", "composition",      "intervals",
-                                   "gyroscope",    "gyroscope_bias", "gyroscope_robust", "essential_bias"};
+  constexpr const char* names[] = {"subspace",       "single_start", "forward",   "discrete",       "gauss_newton",
+                                   "released",       "near_start",   "search",    "essential",      "essential_near",
+                                   "composition",    "intervals",    "gyroscope", "gyroscope_bias", "gyroscope_robust",
+                                   "essential_bias", "upset"};
   return names[static_cast<std::size_t>(method)];
 }
 
@@ -441,6 +474,18 @@ std::vector<MotionRow> motionCells(const std::vector<MotionMethod>& methods) {
   over({M::gyroscope_bias, M::essential_bias}, {orbit, general}, {1, 4, 8}, biased);
   over({M::gyroscope_robust}, {orbit, general}, {1, 4},
        [&](auto world, double sigma) { return wrong(usual(world, sigma)); });
+  for (const bool inertially : {false, true}) {
+    for (const MotionUpset upset : all_motion_upsets) {
+      const bool of_gyroscope = upset == MotionUpset::wrong_sign || upset == MotionUpset::dead;
+      if (upset != MotionUpset::none && of_gyroscope != inertially) continue;
+      MotionSceneOptions options = inertially ? inertial(general, 1) : scene(general, 1);
+      options.upset = upset;
+      add(M::upset, options);
+    }
+  }
+  MotionSceneOptions tenth = scene(general, 1);
+  tenth.outliers = 0.1;
+  add(M::upset, tenth);
   return cells;
 }
 
@@ -451,6 +496,7 @@ std::string sceneOf(const MotionRow& row) {
   if (row.scene.points != normal.points) text += fmt::format(" N={}", row.scene.points);
   if (row.scene.gyroscope_sigma > 0) text += fmt::format(" g {:g}", row.scene.gyroscope_sigma);
   if (row.scene.gyroscope_bias > 0) text += fmt::format(" b {:g}", row.scene.gyroscope_bias);
+  if (row.scene.upset != normal.upset) text += std::string(" ") + nameOf(row.scene.upset);
   if (row.scene.outliers > 0) text += fmt::format(" {:g} % out", 100 * row.scene.outliers);
   return text;
 }

@@ -30,7 +30,8 @@ enum class MotionMethod {
   gyroscope,         ///< subspace filter with a gyroscope, discrete flow, linear start
   gyroscope_bias,    ///< the same, the gyroscope's bias a state
   gyroscope_robust,  ///< the same without the bias, expecting outliers, 32 starts
-  essential_bias     ///< essential filter with a gyroscope, its bias a state
+  essential_bias,    ///< essential filter with a gyroscope, its bias a state
+  upset              ///< MotionFilter where something is wrong that it is not told: which frames does it call usable?
 };
 inline constexpr std::array all_motion_methods = {
     MotionMethod::subspace,       MotionMethod::single_start,   MotionMethod::forward,
@@ -38,7 +39,7 @@ inline constexpr std::array all_motion_methods = {
     MotionMethod::near_start,     MotionMethod::search,         MotionMethod::essential,
     MotionMethod::essential_near, MotionMethod::composition,    MotionMethod::intervals,
     MotionMethod::gyroscope,      MotionMethod::gyroscope_bias, MotionMethod::gyroscope_robust,
-    MotionMethod::essential_bias};
+    MotionMethod::essential_bias, MotionMethod::upset};
 std::string name(MotionMethod method);
 
 struct MotionValidation {
@@ -56,7 +57,9 @@ inline constexpr double motion_success = 10;
 struct MotionPromise {
   std::array<double, 3> success{};  ///< probability of an error below 10°, at least; 0: nothing
   std::array<double, 3> median{};   ///< degrees, at most; 0: nothing
-  double coverage = 0;  ///< probability that a successful run's error is in the 95 % region at frame 100, at least
+  double coverage = 0;       ///< probability that a successful run's error is in the 95 % region at frame 100, at least
+  double usable_frames = 0;  ///< share of the frames that are usable, at least
+  double wrong_frames = 0;   ///< share of the frames that are usable and wrong, at most; 0: nothing
 };
 
 /// One cell of the tables.
@@ -72,6 +75,8 @@ struct MotionRow {
       0;              ///< median number of the frame from which on the error stays below 10°, of those where it does
   double usable = 0;  ///< share of the trials whose last estimate is called usable
   double usable_wrong = 0;  ///< share of these with an error above 10°
+  /// Shares of the frames from 20 on: usable ones, usable ones with an error above 10°; and their standard errors.
+  double usable_frames = 0, wrong_frames = 0, usable_error = 0, wrong_error = 0;
   std::optional<MotionPromise> promise;
   std::optional<bool> passed;
   std::string reason;  ///< the failed criteria, in words
@@ -82,7 +87,7 @@ void describe(V& v, const MotionRow& row) {
   v("method", name(row.method))("scene", nameOf(row.scene.world))("sigma_px", row.scene.sigma, "", "px");
   v("points", row.scene.points)("rotation_deg", row.scene.rotation, "of a frame", "deg");
   v("outliers", row.scene.outliers, "share")("gyroscope_sigma_deg", row.scene.gyroscope_sigma, "", "deg");
-  v("gyroscope_bias_deg", row.scene.gyroscope_bias, "", "deg")("trials", row.trials);
+  v("gyroscope_bias_deg", row.scene.gyroscope_bias, "", "deg")("upset", nameOf(row.scene.upset))("trials", row.trials);
   const MotionPromise promise = row.promise.value_or(MotionPromise{});
   for (std::size_t k = 0; k < motion_frames.size(); ++k) {
     const std::string at = "_" + std::to_string(motion_frames[k]);
@@ -93,6 +98,11 @@ void describe(V& v, const MotionRow& row) {
   }
   v("coverage95", row.coverage)("convergence_frame", row.convergence);
   if (promise.coverage > 0) v("promised_coverage95", promise.coverage);
+  v("usable_frames", row.usable_frames, "share of the frames from 20 on");
+  v("wrong_frames", row.wrong_frames, "share that is usable and more than 10 deg off");
+  if (promise.wrong_frames > 0) {
+    v("promised_usable_frames", promise.usable_frames)("promised_wrong_frames", promise.wrong_frames);
+  }
   v("usable", row.usable)("usable_wrong", row.usable_wrong)("in_domain", row.promise.has_value());
   v("passed", row.passed)("reason", row.reason);
 }

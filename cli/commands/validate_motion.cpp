@@ -15,22 +15,24 @@ using namespace experiments;
 namespace {
 
 std::string titleOf(MotionMethod method) {
-  constexpr const char* names[] = {"Subspace filter, 32 starts, midpoint flow",
-                                   "Subspace filter, one start anywhere",
-                                   "Subspace filter, the report's forward difference",
-                                   "Subspace filter, discrete flow without a gyroscope",
-                                   "Subspace filter, covariance without second derivatives",
-                                   "Subspace filter, depths of either sign",
-                                   "Subspace filter, one start 10 degrees off",
-                                   "Search over 300 directions (Heeger and Jepson)",
-                                   "Essential filter, 32 starts",
-                                   "Essential filter, start 30 % off",
-                                   "Composition: subspace filter, then essential filter",
-                                   "Subspace filter, pairs of up to six frames (orbit) or four",
-                                   "Subspace filter with a gyroscope",
-                                   "Subspace filter with a gyroscope, its bias a state",
-                                   "Subspace filter with a gyroscope among outliers",
-                                   "Essential filter with a gyroscope, its bias a state"};
+  constexpr const char* names[] = {
+      "Subspace filter, 32 starts, midpoint flow",
+      "Subspace filter, one start anywhere",
+      "Subspace filter, the report's forward difference",
+      "Subspace filter, discrete flow without a gyroscope",
+      "Subspace filter, covariance without second derivatives",
+      "Subspace filter, depths of either sign",
+      "Subspace filter, one start 10 degrees off",
+      "Search over 300 directions (Heeger and Jepson)",
+      "Essential filter, 32 starts",
+      "Essential filter, start 30 % off",
+      "Composition: subspace filter, then essential filter",
+      "Subspace filter, pairs of up to six frames (orbit) or four",
+      "Subspace filter with a gyroscope",
+      "Subspace filter with a gyroscope, its bias a state",
+      "Subspace filter with a gyroscope among outliers",
+      "Essential filter with a gyroscope, its bias a state",
+      "Composition, something being wrong that it is not told: usable frames, and wrong ones"};
   return names[static_cast<std::size_t>(method)];
 }
 
@@ -53,9 +55,20 @@ const Columns<MotionRow> columns{
     {"95 %", [](const MotionRow& r) { return hasCovariance(r) ? fmt::format("{:.1f}", 100 * r.coverage) : ""; }},
     {"verdict", [](const MotionRow& row) { return verdictCell(row.passed); }}};
 
+/// A share of the frames in percent, with its standard error.
+std::string percent(double mean, double error) { return fmt::format("{:.2f} +- {:.2f}", 100 * mean, 100 * error); }
+const Columns<MotionRow> upset_columns{
+    {"scene", sceneOf},
+    {"usable %", [](const MotionRow& row) { return percent(row.usable_frames, row.usable_error); }},
+    {"usable, > 10 deg %", [](const MotionRow& row) { return percent(row.wrong_frames, row.wrong_error); }},
+    {"at most", [](const MotionRow& r) { return r.promise ? fmt::format("{:g}", 100 * r.promise->wrong_frames) : ""; }},
+    {"verdict", [](const MotionRow& row) { return verdictCell(row.passed); }}};
+
 ValidationTable tableOf(const std::vector<MotionRow>& rows, MotionMethod method) {
   const auto own = selected(rows, [&](const MotionRow& row) { return row.method == method; });
-  ValidationTable table{.title = titleOf(method), .table = tablesOf(columns, own)};
+  ValidationTable table{.title = titleOf(method),
+                        .table = tablesOf(method == MotionMethod::upset ? upset_columns : columns, own)};
+  if (method == MotionMethod::upset) return table;
   Panel success{
       "errors below 10 degrees", {.label = "frame", .low = 0.0}, {.label = "share", .low = 0.0, .high = 1.05}};
   Panel median{"median error", {.label = "frame", .low = 0.0}, {.label = "degrees", .logarithmic = true}};

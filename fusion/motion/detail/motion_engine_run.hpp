@@ -249,7 +249,11 @@ LIESTAT_FUSION_INLINE void MotionEngine::judgeGyroscope() {
 /// outliers it may have followed those.)
 LIESTAT_FUSION_INLINE void MotionEngine::followProcessNoise() {
   process_noise_ *= 0.9;
-  if (!updated_ || candidates_.size() > 1 || options_.outliers) return;
+  if (!updated_ || options_.outliers) return;
+  // Pairs that overlap have common errors, and those of a direction that a gyroscope determines are slow ones: they go
+  // further by chance, and while hypotheses compete the best one's way is mostly that.
+  const bool overlap = std::any_of(pairs_.begin(), pairs_.end(), [](const PointPair& p) { return p.frames > 1; });
+  if (candidates_.size() > 1 && (overlap || frame_.has_gyroscope)) return;
   const DirectionCandidate& c = candidates_[best_];
   const Eigen::Vector3d V = c.direction.unit_vector();
   const Place& before = way_[(updates_way_ + way_frames - 1) % way_frames];
@@ -265,7 +269,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::followProcessNoise() {
     const double squared = out.squaredNorm();
     if (!(squared > 0)) continue;
     const double expected = std::max((out.dot(then.covariance * out) - back.dot(now.covariance * back)) / squared, 0.0);
-    if (squared > 4 * (expected + now.noise - then.noise)) {
+    if (squared > (overlap || frame_.has_gyroscope ? 9 : 4) * (expected + now.noise - then.noise)) {
       const double needed = 2 * (squared - expected) / (2 * static_cast<double>(n));
       process_noise_ = std::min(std::max(process_noise_, needed), options_.max_process_noise);
     }
