@@ -16,7 +16,8 @@ int main(int argc, char** argv) {
         {addSimulateHandEyeCommand, addSimulateMotionCommand, addSimulateTwoViewCommand, addSimulateViCommand}},
        {"validate",
         validate_description,
-        {addValidateEstimatorCommand, addValidateHandEyeCommand, addValidateMeansCommand, addValidateMotionCommand,
-         addValidatePreintegrationCommand, addValidatePropagationCommand, addValidateRobustCommand,
-         addValidateSplitCommand, addValidateTwoViewCommand, addValidateViInitCommand}}});
+        {addValidateEstimatorCommand, addValidateGroupsCommand, addValidateHandEyeCommand, addValidateLawsCommand,
+         addValidateMeansCommand, addValidateMotionCommand, addValidatePreintegrationCommand,
+         addValidatePropagationCommand, addValidateRobustCommand, addValidateSplitCommand, addValidateTwoViewCommand,
+         addValidateViInitCommand}}});
 }

@@ -93,7 +93,8 @@ struct LawFit {
   double mean_resultant = std::numeric_limits<double>::quiet_NaN();  ///< of vmf and von_mises: R/n
   double log_likelihood = 0;                                         ///< relative to the uniform law
   LawTest uniformity = {};  ///< against the uniform law; of wrapped_normal that of matrix_fisher
-  LawTest symmetry = {};    ///< against equal κ: symmetry about the location; not of von_mises
+  LawTest kind = {};      ///< of bingham: a girdle against a symmetric cluster, or a cluster against a symmetric girdle
+  LawTest symmetry = {};  ///< against equal κ: symmetry about the location; not of von_mises
   /// Moments of third and fourth order against those of the law: the omnibus χ². Its p is Bonferroni's of that and of
   /// single moments along the axes, of which one may tell what the omnibus does not.
   LawTest goodness = {};
@@ -125,6 +126,7 @@ void describe(V& v, const LawFit& fit) {
   v("mean_resultant", fit.mean_resultant, "length of the mean vector; of vmf and von-mises");
   v("log_likelihood", fit.log_likelihood, "relative to the uniform law");
   v("uniformity", fit.uniformity, "likelihood ratio against the uniform law");
+  v("kind", fit.kind, "of bingham: a girdle against a symmetric cluster, or a cluster against a symmetric girdle");
   v("symmetry", fit.symmetry, "against rotational symmetry about the location");
   v("goodness", fit.goodness, "moments against those of the law");
   v("replicates", fit.replicates, "of the bootstrap behind goodness.p; 0: by chi-squared");
@@ -142,7 +144,7 @@ LIESTAT_LAWS_API BinghamMoments binghamMoments(const Eigen::VectorXd& mu);
 /// Fits a law to the features in the rows of a matrix with parametersOf(model) columns, whose norms are one to rounding.
 ///
 /// `inconsistent`: the goodness of fit refutes the law (p below refutation_level). `ill_defined`: uniform features would
-/// look like that in one case of a hundred, the location is open by more than 0.7 rad, or the features are equal to
+/// look like that in one case of a hundred, axes do not tell a girdle from a cluster, the location is open by more than 0.7 rad, or the features are equal to
 /// rounding, so that κ has no bound. `too_few`: fewer than ten features, of rotations 18. `not_applicable`: other columns,
 /// or numbers that are not finite. `not_converged`: the iteration of a wrapped normal law.
 LIESTAT_LAWS_API LawFit fitLaw(LawModel model, const Eigen::Ref<const Eigen::MatrixXd>& features,

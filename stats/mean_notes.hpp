@@ -74,6 +74,9 @@ inline void addMeanNotes(MeanSummary& mean, std::size_t measurements) {
     mean.notes.push_back("the region is widened by " + significant(mean.skew_factor, 3) +
                          " by a bootstrap, for the skewness of the errors");
   }
+  if (mean.repeated.matters && mean.hasCovariance()) {
+    addDoubt(no, mean.repeated.inWords() + ": the covariance takes them for independent measurements");
+  }
   const bool in_time = mean.dependence.dependent();
   if (in_time && mean.hasCovariance() && !mean.inflated) {
     addDoubt(no, "the errors of successive rows are not independent: " + mean.dependence.inWords() +

@@ -9,6 +9,7 @@
 #include <stats/mean_region.hpp>
 #include <stats/noise_fit.hpp>
 #include <stats/residual_noise.hpp>
+#include <stats/repeated_rows.hpp>
 #include <stats/row_order.hpp>
 #include <stats/shown.hpp>
 #include <stats/skewness.hpp>
@@ -172,6 +173,7 @@ struct MeanSummary {
   NoiseFit fit = {};          ///< of the measurements to the noise that is stated for them
   bool noise_scaled = false;  ///< the covariance is multiplied by fit.factor()
 
+  RepeatedRows repeated = {};           ///< equal measurements, of up to 200 000
   RowOrder order = {};                  ///< correlation of successive measurements
   Skewness skewness = {};               ///< of the measurements' errors
   TimeDependence dependence = {};       ///< of the errors, where the measurements have times

@@ -400,6 +400,15 @@ MeanSummary summarizedMean(const E& executor, const MeanInput<M>& input, const M
   } else {
     detail::setBarycentre(mean, any, input, options);
   }
+  if (input.features.size() <= MeanInput<M>::max_timed_rows) {
+    mean.repeated = repeatedRows(input.features.size(), ManifoldTraits<M>::DoF, [&](std::size_t i) -> decltype(auto) {
+      if constexpr (requires { input.features[i].params(); }) {
+        return input.features[i].params();
+      } else {
+        return (input.features[i]);
+      }
+    });
+  }
   mean.noise_scaled = input.scale_noise && mean.known_noise && mean.hasCovariance() && mean.fit.tested();
   if (mean.noise_scaled && !options.certificates) mean.covariance *= mean.fit.factor();
   if (!isRobust(input.criterion)) detail::setTimeDependence(mean, input);

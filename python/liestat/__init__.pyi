@@ -1356,6 +1356,7 @@ class _LawFit(Result):
     mean_resultant: float  # length of the mean vector; of vmf and von-mises
     log_likelihood: float  # relative to the uniform law
     uniformity: _LawTest  # likelihood ratio against the uniform law
+    kind: _LawTest  # of bingham: a girdle against a symmetric cluster, or a cluster against a symmetric girdle
     symmetry: _LawTest  # against rotational symmetry about the location
     goodness: _LawTest  # moments against those of the law
     replicates: int  # of the bootstrap behind goodness.p; 0: by chi-squared

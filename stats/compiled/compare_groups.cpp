@@ -7,6 +7,7 @@
 #include <stats/detail/tail_probabilities.hpp>
 #include <stats/noise_fit.hpp>
 #include <stats/random.hpp>
+#include <stats/repeated_rows.hpp>
 #include <stats/words.hpp>
 
 #include <Eigen/Cholesky>
@@ -290,6 +291,21 @@ void checkSkewness(const std::vector<MatrixXd>& lists, GroupComparison& result) 
   }
 }
 
+/// Rows that stand in a group more often than once make means more certain than they are.
+void checkRepeats(const std::vector<MatrixXd>& lists, GroupComparison& result) {
+  for (const MatrixXd& rows : lists) {
+    const RepeatedRows repeated =
+        repeatedRows(static_cast<std::size_t>(rows.rows()), static_cast<int>(rows.cols()),
+                     [&](std::size_t i) { return VectorXd(rows.row(static_cast<Index>(i)).transpose()); });
+    if (!repeated.matters || result.status != Status::ok) continue;
+    result.status = Status::inconsistent;
+    result.reason =
+        (lists.size() > 1 ? "group " + result.groups[static_cast<std::size_t>(&rows - lists.data())].name + ": "
+                          : std::string()) +
+        repeated.inWords() + ": no p here holds";
+  }
+}
+
 /// The status of a comparison that was made.
 void setStatus(Index d, GroupComparison& result) {
   const auto least = static_cast<std::size_t>(std::max<Index>(10, 4 * d));
@@ -323,7 +339,7 @@ GroupComparison compareVectors(const std::vector<MatrixXd>& groups, const Compar
   }
   adjustByHolm(result.pairs);
   setStatus(groups[0].cols(), result);
-  checkSkewness(groups, result);
+  checkRepeats(groups, result), checkSkewness(groups, result);
   return result;
 }
 
@@ -349,7 +365,7 @@ GroupComparison compareVectorPairs(const MatrixXd& first, const MatrixXd& second
   test.p = detail::hotellingTail(test.statistic, static_cast<int>(first.cols()), n);
   result.pairs.push_back({0, 1, differences.mean, MatrixXd(differences.covariance / n), test, test.p});
   setStatus(first.cols(), result);
-  checkSkewness({second - first}, result);
+  checkRepeats({second - first}, result), checkSkewness({second - first}, result);
   return result;
 }
 

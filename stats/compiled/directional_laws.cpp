@@ -11,6 +11,7 @@
 #include <stats/detail/tail_probabilities.hpp>
 #include <stats/noise_fit.hpp>
 #include <stats/random.hpp>
+#include <stats/repeated_rows.hpp>
 
 #include <Eigen/Geometry>
 
@@ -635,18 +636,24 @@ void testSpecialCases(const Core& core, const MatrixXd& features, LawFit& fit) {
   // Box's factor of a test of sphericity, which this is where the law is nearly normal.
   const double k = d, factor = (n - 1 - (2 * k * k + k + 2) / (6 * k)) / n;
   fit.symmetry = likelihoodRatio(core.log_likelihood, less, core.girdle ? 1 : factor, d * (d + 1) / 2 - 1);
+  if (model != LawModel::bingham) return;
+  // A pole is that of axes that are no symmetric cluster, and a mode that of axes that are no symmetric girdle.
+  const Design other = designOf(model, true, !core.girdle);
+  const VectorXd s = other.design.transpose() * core.tau;
+  const double least = logLikelihood(other.design, solveConcentrations(other.design, s), s, n);
+  fit.kind = likelihoodRatio(core.log_likelihood, least, factor, 2);
 }
 
 /// Adds to the covariance of several κ the outer product of their bias: that of maximum likelihood, 3 κ/n, and that of
 /// sorting. As eigenvalues of a matrix κ repel each other where they differ by less than a few standard deviations of the
-/// element off the diagonal, whose variances are given: of an observed gap g the truth's square is g² less four of these
-/// in expectation.
+/// element off the diagonal, whose variances v are given: the squared gap of two equal ones is 4 v χ²₂, of which three
+/// quarters are below 12 v. The bias is that of a truth whose squared gap is less by this.
 void widenByBias(const VectorXd& kappa, const MatrixXd& variances, double n, MatrixXd& covariance) {
   VectorXd bias = 3 / n * kappa;
   for (Index i = 0; i < kappa.size(); ++i) {
     for (Index j = i + 1; j < kappa.size(); ++j) {
       const double gap = kappa[i] - kappa[j];
-      const double shift = 0.5 * (gap - std::sqrt(std::max(0.0, gap * gap - 4 * variances(i, j))));
+      const double shift = 0.5 * (gap - std::sqrt(std::max(0.0, gap * gap - 12 * variances(i, j))));
       bias[i] += shift, bias[j] -= shift;
     }
   }
@@ -735,6 +742,9 @@ void judge(LawFit& fit) {
   } else if (!(fit.uniformity.p < uniform_level)) {
     fit.status = Status::ill_defined;
     fit.reason = "uniform features would look like these in one case of a hundred or more";
+  } else if (fit.kind.p > uniform_level) {
+    fit.status = Status::ill_defined;
+    fit.reason = "the axes do not tell a girdle from a cluster: the location may be a pole or a mode";
   } else if (!(fit.alpha95() < located)) {
     fit.status = Status::ill_defined;
     fit.reason =
@@ -803,6 +813,8 @@ LawFit fitLaw(LawModel model, const Eigen::Ref<const MatrixXd>& features, const 
       return fit;
     }
   }
+  const RepeatedRows repeated = repeatedRows(
+      fit.n, dofOf(model), [&](std::size_t i) { return Few(features.row(static_cast<Index>(i)).transpose()); });
   const Core core = fitCore(model, rows);
   fit.law = core.law, fit.girdle = core.girdle, fit.log_likelihood = core.log_likelihood;
   fit.names =
@@ -819,6 +831,8 @@ LawFit fitLaw(LawModel model, const Eigen::Ref<const MatrixXd>& features, const 
   testSpecialCases(core, rows, fit);
   setCovariances(core, reference, fit);
   judge(fit);
+  if (repeated.matters)
+    fit.status = Status::inconsistent, fit.reason = repeated.inWords() + ": they are not independent";
   return fit;
 }
 

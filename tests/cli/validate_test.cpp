@@ -5,7 +5,9 @@
 #include <cli/commands/split.hpp>
 #include <cli/show/split.hpp>
 #include <experiments/estimator_validation.hpp>
+#include <experiments/groups_validation.hpp>
 #include <experiments/hand_eye_validation.hpp>
+#include <experiments/laws_validation.hpp>
 #include <experiments/means_validation.hpp>
 #include <experiments/motion_validation.hpp>
 #include <experiments/preintegration_validation.hpp>
@@ -86,6 +88,12 @@ const std::vector<Subject>& subjects() {
        "motion --trials 30 --method gyroscope_bias --noise-factor 4",
        "motion --trials 100000 --method gyroscope",
        {"--method luck", "--noise-factor 0", "--trials 0"}},
+      {"groups --trials 4", {{"rows", fields<GroupRow>()}}, "", "groups --trials 1000000", {"--trials 0"}, 110},
+      {"laws --trials 4 --kappa 5 --law vmf,bingham",
+       {{"rows", fields<LawRow>()}},
+       "",
+       "laws --trials 1000000 --law vmf",
+       {"--law cauchy", "--kappa 0", "--n 9", "--trials 0"}},
       {"preintegration --trials 20 --window 0.1",
        {{"rows", fields<PreintegrationRow>()}},
        "",

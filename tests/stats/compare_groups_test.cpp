@@ -1,5 +1,5 @@
 // Comparisons of groups: exact laws on points, levels on manifolds, permutations, pairs, refusals. Levels from 10⁴ trials:
-// compare_groups_levels_test.
+// liestat validate groups.
 #include <lie/frame3.hpp>
 #include <lie/rn.hpp>
 #include <lie/s2.hpp>
@@ -198,6 +198,18 @@ TEST(CompareGroups, skewedGroupsOfUnequalSizesHaveNoVerdict) {
   EXPECT_EQ(normal, 20);  // .001 each
   CounterRng rng(950);
   EXPECT_EQ(compareVectorPairs(exponential(60, rng), Eigen::MatrixXd::Zero(60, 3)).status, Status::inconsistent);
+}
+
+TEST(CompareGroups, repeatedRowsHaveNoVerdict) {
+  CounterRng rng(960);
+  const Eigen::MatrixXd a = normals(20, 3, 1, rng), b = normals(40, 3, 1, rng);
+  Eigen::MatrixXd twice(40, 3);
+  twice << a, a;
+  EXPECT_TRUE(compareVectors({a, b}).ok());
+  const GroupComparison found = compareVectors({b, twice});
+  EXPECT_EQ(found.status, Status::inconsistent);
+  EXPECT_EQ(found.reason.find("group 2: rows are repeated"), 0U) << found.reason;
+  EXPECT_EQ(compareVectorPairs(Eigen::MatrixXd::Zero(40, 3), twice).status, Status::inconsistent);
 }
 
 TEST(CompareGroups, refusals) {

@@ -173,6 +173,10 @@ TEST(MeanNotes, SayWhatIsRemarkable) {
   EXPECT_TRUE(says(noted(points, weights), "1 measurement has no weight beside the others and is not counted"));
   EXPECT_EQ(noted({{1, 2, 3}}).notes, std::vector<std::string>{"one measurement is its own mean"});
   EXPECT_TRUE(says(noted(std::vector<Point>(9, Point(1, 2, 3))), "all measurements are equal: a covariance"));
+  std::vector<Point> twice = points;
+  twice.insert(twice.end(), points.begin(), points.end());
+  EXPECT_TRUE(says(noted(twice), "rows are repeated, on average each by 1.0 others"));
+  EXPECT_TRUE(noted(twice).doubt.isNo());
   std::vector<Point> flat = points;
   for (Point& p : flat) p.z() = 1;
   EXPECT_TRUE(says(noted(flat), "do not vary in every direction"));
