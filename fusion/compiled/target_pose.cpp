@@ -34,6 +34,8 @@ constexpr double least_contrast = 4, least_contrast_in_noise = 3;
 /// Misfit that widens, in standard deviations of its law under noise, and its size that is another thing than a target.
 constexpr double significant_misfit = 3, largest_misfit = 10;
 constexpr int blocks = 8;
+/// Width of a tag's cells, px, below which they are not resolved, and a fit ends beside the tag.
+constexpr double least_cell = 0.8;
 
 /// Black and white cells; those outside continue the nearest.
 struct Cells {
@@ -499,6 +501,15 @@ TargetView fitTag(const GreyView& image, const Undistorted& undistorted, const T
   const auto to_cells = fitHomography(places, corners);
   if (!to_cells) return {};
   const double half = seen.side / 2.;
+  const Eigen::Matrix3d back = to_cells->inverse();
+  const Eigen::Vector3d centre = back * Eigen::Vector3d(half, half, 1);
+  const auto slope = undistorted.pixelBy(centre.hnormalized());
+  if (!slope) return {};
+  const Eigen::Matrix2d cell =
+      *slope * (back.topLeftCorner<2, 2>() - centre.hnormalized() * back.block<1, 2>(2, 0)) / centre.z();
+  const double square = cell.squaredNorm() / 2, area = cell.determinant();
+  const double narrow = std::sqrt(std::max(square - std::sqrt(std::max(square * square - area * area, 0.)), 0.));
+  if (!(narrow >= least_cell)) return {};
   const Placed placed{{seen.side, seen.side, seen.cells}, *to_cells, {half, half}, half - rim, 8};
   double contrast = 0;
   if (!fitPoints(image, undistorted, placed, corners, result.view.pixels, result.view.covariance, result.about,
