@@ -25,7 +25,7 @@ using testing::RenderedSheet;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double degree = EIGEN_PI / 180;
-const std::vector<Eigen::Vector2d> square = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+const std::vector<Eigen::Vector2d> unit_square = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
 
 Camera lens(int width, int height, double focal) {
   Camera camera{.fu = focal, .fv = focal, .cu = (width - 1) / 2., .cv = (height - 1) / 2.};
@@ -42,7 +42,7 @@ PlanarView cornersOf(const SE3d& pose, const Camera& camera, double size, double
   std::normal_distribution<double> normal;
   PlanarView view;
   view.covariance.resize(8, 2);
-  for (const Eigen::Vector2d& corner : square) {
+  for (const Eigen::Vector2d& corner : unit_square) {
     const Eigen::Vector2d point = size / 2 * corner;
     view.covariance.middleRows<2>(2 * static_cast<Eigen::Index>(view.points.size())) =
         stated * stated * Eigen::Matrix2d::Identity();
@@ -182,7 +182,7 @@ SeenTarget seenTag(const RenderedSheet& sheet, const SE3d& pose, const Camera& c
                    std::mt19937& rng) {
   std::normal_distribution<double> normal;
   SeenTarget seen{.id = 0, .pixels = {}, .side = 10, .border = 8, .cells = sheet.white};
-  for (const Eigen::Vector2d& corner : square) {
+  for (const Eigen::Vector2d& corner : unit_square) {
     const Eigen::Vector2d point = 0.04 * corner;
     seen.pixels.push_back(*camera.project(pose * Eigen::Vector3d(point.x(), point.y(), 0)) +
                           std::min(0.3, pixels / 6) * Eigen::Vector2d(normal(rng), normal(rng)));
