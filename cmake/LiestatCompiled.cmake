@@ -18,7 +18,7 @@ set(LIESTAT_COMPILED_SOURCES_estimation constrained implicit_ekf fits)
 set(LIESTAT_COMPILED_SOURCES_laws directional_laws compare_groups)
 set(LIESTAT_COMPILED_SOURCES_fusion
     initialisation initialisation_truth recording noise_calibration homography_models epipolar_models pose_models
-    robust_two_view two_view hand_eye motion patch tracker)
+    robust_two_view two_view hand_eye motion patch tracker planar_pose target_pose)
 set(LIESTAT_COMPILED_SOURCES_trajectories
     trajectories evaluate trajectory_misfit convention_diagnosis trajectory_conversion recording_windows)
 set(LIESTAT_COMPILED_NEEDS_laws random123)

@@ -32,6 +32,8 @@ liestat_dependency(opencv libopencv-calib3d-dev opencv2/calib3d.hpp)
 # Images (fusion/compat/opencv.cpp), in a module that is opened on demand.
 liestat_dependency(opencv_images "libopencv-video-dev libopencv-imgcodecs-dev libopencv-videoio-dev"
                    opencv2/video/tracking.hpp)
+# Tags in images (`liestat tag-pose`), in the same module.
+liestat_dependency(apriltag libapriltag-dev apriltag/tag36h11.h)
 # Headers for an extension of SQLite (engines/sqlite).
 liestat_dependency(sqlite libsqlite3-dev sqlite3ext.h)
 # Its makefiles, and the server that the tests start (engines/postgresql).
@@ -113,7 +115,7 @@ macro(liestat_find name)
     liestat_provide_package(yaml yaml-cpp yaml-cpp::yaml-cpp yaml-cpp) # the second is the name before 0.8
   elseif("${name}" STREQUAL "zlib")
     liestat_provide_package(zlib ZLIB ZLIB::ZLIB)
-  elseif("${name}" MATCHES "^(bz2|lz4|zstd|sqlite_library)$")
+  elseif("${name}" MATCHES "^(bz2|lz4|zstd|sqlite_library|apriltag)$")
     string(REPLACE sqlite_library sqlite3 liestat_library ${name})
     liestat_provide_library(${name} ${liestat_library})
   elseif("${name}" STREQUAL "gtest")

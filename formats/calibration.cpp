@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <utility>
 
 #include <formats/input_error.hpp>
@@ -148,7 +149,7 @@ struct Parsed {
   std::string file;
 };
 
-void addCamera(const detail::Section& section, std::string name, Parsed& parsed) {
+void addCamera(const detail::Section& section, std::string name, Parsed& parsed, bool needs_pose = true) {
   CameraCalibration result;
   result.name = std::move(name);
   result.camera = cameraOf(section);
@@ -168,7 +169,7 @@ void addCamera(const detail::Section& section, std::string name, Parsed& parsed)
       result.imu_T_cam = inverse;
     }
   }
-  const bool to_body = !T_cam_imu && !T_imu_cam;
+  const bool to_body = !T_cam_imu && !T_imu_cam && (needs_pose || T_BS);
   if (to_body) {
     if (!T_BS) {
       section.complainMissing(
@@ -176,7 +177,7 @@ void addCamera(const detail::Section& section, std::string name, Parsed& parsed)
           "T_cam_imu (takes the IMU's coordinates to the camera's) or T_imu_cam (its inverse), or EuRoC's T_BS");
     }
     result.imu_T_cam = detail::rigidMotion(*T_BS);
-  } else if (T_BS) {
+  } else if (T_BS && (T_cam_imu || T_imu_cam)) {
     T_BS->complain("stands beside T_cam_imu or T_imu_cam", "one of them");
   }
   if (const auto shift = section.find("timeshift_cam_imu")) result.timeshift_cam_imu = shift->number("seconds");
@@ -202,22 +203,164 @@ void addImu(const detail::Section& section, Parsed& parsed) {
   if (const auto T_BS = section.find("T_BS")) parsed.body_T_imu = detail::rigidMotion(*T_BS);
 }
 
-Parsed parseFile(std::string_view text, const std::string& name) {
+/// A camera of OpenCV's FileStorage, or of ROS.
+void addStoredCamera(const detail::Section& root, Parsed& parsed) {
+  const auto findAny = [&](std::initializer_list<const char*> keys) {
+    for (const char* key : keys) {
+      if (auto found = root.find(key)) return found;
+    }
+    return std::optional<detail::NamedNode>();
+  };
+  const auto valuesOf = [](const detail::NamedNode& matrix, const std::string& expected) {
+    detail::NamedNode data = matrix;
+    if (matrix.node.IsMap() && matrix.node["data"].IsDefined()) data.node.reset(matrix.node["data"]);
+    return detail::numbers(data, expected);
+  };
+  CameraCalibration result;
+  result.name = "camera";
+  Camera& camera = result.camera;
+  const auto matrix = findAny({"camera_matrix", "Camera_Matrix", "cameraMatrix", "K"});
+  const std::string rows = "nine numbers, fu 0 cu 0 fv cv 0 0 1";
+  const std::vector<double> k = valuesOf(*matrix, rows);
+  if (k.size() != 9) matrix->complain(fmt::format("has {} numbers", k.size()), rows);
+  if (!(k[0] > 0) || !(k[4] > 0)) matrix->complain(fmt::format("has the focal lengths {} and {}", k[0], k[4]), rows);
+  if (k[1] != 0) matrix->complain(fmt::format("has the skew {}", k[1]), "none");
+  camera.fu = k[0], camera.cu = k[2], camera.fv = k[4], camera.cv = k[5];
+  const auto list =
+      findAny({"distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs", "distortion", "D"});
+  const auto model = findAny({"distortion_model"}), fisheye = findAny({"fisheye_model"});
+  const std::string word = model && model->node.IsScalar() ? model->node.Scalar() : "";
+  const bool bends_by_angle = word == "equidistant" || word == "fisheye" ||
+                              (fisheye && fisheye->node.IsScalar() && fisheye->node.Scalar() != "0");
+  if (model && !bends_by_angle && word != "plumb_bob" && word != "rational_polynomial") {
+    model->complain("is " + detail::shown(model->node), "plumb_bob, rational_polynomial or equidistant");
+  }
+  if (list) {
+    const std::string expected = bends_by_angle ? "four numbers, k1 k2 k3 k4" : "k1 k2 p1 p2 and k3, others zero";
+    const std::vector<double> c = valuesOf(*list, expected);
+    const std::size_t used = bends_by_angle ? 4 : 5;
+    if (c.size() < 4 || c.size() > 14 || (bends_by_angle && c.size() != 4)) {
+      list->complain(fmt::format("are {}", c.size()), expected);
+    }
+    for (std::size_t i = used; i < c.size(); ++i) {
+      if (c[i] != 0) list->complain(fmt::format("have {} in place {}", c[i], i + 1), expected);
+    }
+    camera.distortion = bends_by_angle ? Distortion::equidistant : Distortion::radtan;
+    camera.coefficients << c[0], c[1], c[2], c[3];
+    if (!bends_by_angle && c.size() > 4) camera.k3 = c[4];
+  }
+  const auto sizeOf = [&](std::initializer_list<const char*> keys) {
+    const auto size = findAny(keys);
+    if (!size) return 0;
+    const double pixels = size->number("whole pixels");
+    if (!(pixels >= 1 && pixels <= 1e6 && pixels == std::floor(pixels))) {
+      size->complain(fmt::format("is {}", pixels), "whole pixels");
+    }
+    return static_cast<int>(pixels);
+  };
+  camera.width = sizeOf({"image_width", "image_Width", "width"});
+  camera.height = sizeOf({"image_height", "image_Height", "height"});
+  parsed.calibration.cameras.push_back(std::move(result));
+}
+
+/// OpenCV's XML as YAML, line by line: elements that hold elements are maps, and a matrix's numbers are a list.
+std::string yamlOfXml(std::string_view text, const std::string& file) {
+  const auto refuse = [&](std::size_t at, const std::string& found) {
+    return InputError(
+        file,
+        1 + static_cast<std::size_t>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n')),
+        found, "OpenCV's FileStorage: <opencv_storage> with <camera_matrix>");
+  };
+  std::string yaml;
+  std::vector<std::string> open;
+  std::size_t at = 0;
+  const auto lines = [&](std::string_view part) {
+    return std::string(static_cast<std::size_t>(std::count(part.begin(), part.end(), '\n')), '\n');
+  };
+  while (true) {
+    const std::size_t begin = text.find('<', at);
+    if (begin == std::string_view::npos) break;
+    std::string content(text.substr(at, begin - at));
+    const bool comment = text.substr(begin, 4) == "<!--";
+    const std::size_t end = text.find(comment ? "-->" : ">", begin);
+    if (end == std::string_view::npos) throw refuse(begin, "a tag is not closed");
+    std::string tag(text.substr(begin + 1, end - begin - 1));
+    at = end + (comment ? 3 : 1);
+    const std::string skipped = lines(text.substr(begin, at - begin));
+    if (comment || tag[0] == '?' || tag[0] == '!') {
+      yaml += lines(content) + skipped;
+      continue;
+    }
+    if (tag[0] != '/') {
+      yaml += lines(content) + skipped;
+      const std::string name = tag.substr(0, tag.find_first_of(" \t\r\n/"));
+      if (name.empty() || name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") !=
+                              std::string::npos) {
+        throw refuse(begin, "a tag has the name '" + printable(name) + "'");
+      }
+      yaml += (open.empty() ? "" : "\"" + name + "\": ");
+      if (tag.back() == '/') {
+        yaml += "\"\",";
+      } else {
+        open.push_back(name);
+        // A map or a value: the next tag tells.
+        const std::size_t next = text.find('<', at);
+        const bool holds = next != std::string_view::npos && text.substr(next, 2) != "</";
+        if (holds) yaml += "{";
+      }
+      continue;
+    }
+    if (open.empty() || tag.substr(1) != open.back())
+      throw refuse(begin, "</" + printable(tag.substr(1)) + "> closes nothing");
+    const bool held = !yaml.empty() && yaml.find_last_not_of(" \n\t\r") != std::string::npos &&
+                      (yaml[yaml.find_last_not_of(" \n\t\r")] == ',' || yaml[yaml.find_last_not_of(" \n\t\r")] == '{');
+    if (held) {
+      yaml += lines(content) + skipped + "}";
+    } else if (open.back() == "data") {
+      std::string list;
+      bool between = false;
+      for (const char c : content) {
+        const bool blank = c == ' ' || c == '\t' || c == '\r' || c == '\n';
+        if (!blank && between) list += ',';
+        list += blank ? (c == '\n' ? '\n' : ' ') : c;
+        between = blank && (between || list.find_first_not_of(" \n") != std::string::npos);
+      }
+      yaml += "[" + list + "]" + skipped;
+    } else {
+      std::string value = content;
+      std::replace(value.begin(), value.end(), '"', ' ');
+      yaml += "\"" + value + "\"" + skipped;
+    }
+    open.pop_back();
+    if (!open.empty()) yaml += ",";
+  }
+  if (!open.empty()) throw refuse(text.size(), "<" + printable(open.back()) + "> is not closed");
+  return yaml;
+}
+
+Parsed parseFile(std::string_view text, const std::string& name, bool needs_pose = true) {
+  std::string converted;
+  if (!needs_pose && text.substr(0, 5) == "<?xml") text = converted = yamlOfXml(text, name);
   return detail::withRoot(text, name, [&](const detail::Section& root) {
     Parsed parsed;
     parsed.file = name;
+    if (!needs_pose) {
+      for (const char* key : {"camera_matrix", "Camera_Matrix", "cameraMatrix", "K"}) {
+        if (root.has(key)) return addStoredCamera(root, parsed), parsed;
+      }
+    }
     for (const auto& entry : root.node) {
       if (!entry.first.IsScalar()) continue;
       const std::string key = entry.first.Scalar();
       if (!entry.second.IsMap()) continue;
-      if (isCameraName(key)) addCamera(detail::Section(entry.second, name, key), key, parsed);
+      if (isCameraName(key)) addCamera(detail::Section(entry.second, name, key), key, parsed, needs_pose);
       if (key == "imu0") addImu(detail::Section(entry.second, name, key), parsed);
     }
     const auto sensor_type = root.find("sensor_type");
     const std::string type = sensor_type && sensor_type->node.IsScalar() ? sensor_type->node.Scalar() : "";
     if (type == "camera" || (type.empty() && root.has("intrinsics"))) {
       const std::string directory = directoryOf(name);
-      addCamera(root, directory.empty() ? "cam0" : printable(directory), parsed);
+      addCamera(root, directory.empty() ? "cam0" : printable(directory), parsed, needs_pose);
     }
     const bool any_density = std::any_of(densities.begin(), densities.end(), [&](auto* key) { return root.has(key); });
     if (!parsed.calibration.imu && (type == "imu" || any_density)) addImu(root, parsed);
@@ -239,6 +382,20 @@ Calibration finished(Parsed&& parsed) {
 }
 
 }  // namespace
+
+std::vector<CameraCalibration> parseCameras(std::string_view text, const std::string& name) {
+  Parsed parsed = parseFile(text, name, false);
+  if (parsed.calibration.cameras.empty()) {
+    throw InputError(name, 0, "there is no camera in it",
+                     "camera_matrix (OpenCV, ROS), cam0 (Kalibr, OpenVINS) or EuRoC's sensor.yaml");
+  }
+  return std::move(parsed.calibration.cameras);
+}
+
+std::vector<CameraCalibration> readCameras(const std::string& path) {
+  const TextFile file = loadText(path);
+  return parseCameras(file.text, file.name);
+}
 
 Calibration parseCalibration(std::string_view text, const std::string& name) { return finished(parseFile(text, name)); }
 

@@ -27,6 +27,13 @@ struct Calibration {
 /// projected), where numbers are too few or not finite, where a camera is no pinhole (with radtan, equidistant or no
 /// distortion), and where two files have the same camera or an IMU each.
 Calibration readCalibration(const std::vector<std::string>& paths);
+/// The cameras of one file, wherever they sit: those above, of which none needs a pose, and intrinsics by OpenCV's
+/// FileStorage (YAML, or XML) or ROS (camera_info): camera_matrix, distortion_coefficients, image_width, image_height.
+/// Throws InputError as above, and where a camera has coefficients of distortion beyond k1 k2 p1 p2 k3.
+std::vector<CameraCalibration> readCameras(const std::string& path);
+/// The same from memory.
+std::vector<CameraCalibration> parseCameras(std::string_view text, const std::string& name);
+
 /// One file from memory; `name` stands for it in messages.
 Calibration parseCalibration(std::string_view text, const std::string& name);
 

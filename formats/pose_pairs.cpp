@@ -94,10 +94,17 @@ void requireMeasured(const FeatureFile& file, const std::string& name) {
 }  // namespace
 
 PosePairs readPosePairs(const std::string& path_a, const std::string& path_b, const PosePairOptions& options) {
-  const std::string name_a = sourceName(path_a), name_b = sourceName(path_b);
-  if (path_a == "-" && path_b == "-") throw InputError(name_a, 0, "both files are standard input", "a file for one");
+  if (path_a == "-" && path_b == "-") {
+    throw InputError(sourceName(path_a), 0, "both files are standard input", "a file for one");
+  }
+  return readPosePairs(path_a, readPoses(path_b, options.reading), sourceName(path_b), options);
+}
+
+PosePairs readPosePairs(const std::string& path_a, FeatureFile b, const std::string& name_b,
+                        const PosePairOptions& options) {
+  const std::string name_a = sourceName(path_a);
   PosePairs pairs;
-  pairs.a = readPoses(path_a, options.reading), pairs.b = readPoses(path_b, options.reading);
+  pairs.a = readPoses(path_a, options.reading), pairs.b = std::move(b);
   requireMeasured(pairs.a, name_a), requireMeasured(pairs.b, name_b);
   pairs.by_time = !options.by_row && !pairs.a.times.empty() && !pairs.b.times.empty();
   const std::string at_least = fmt::format("at least {}", options.least);

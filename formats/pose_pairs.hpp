@@ -38,5 +38,8 @@ struct PosePairs {
 /// within the tolerance are pairs; else row i belongs to row i. Throws InputError: a file of something else than poses,
 /// different lengths, a time that appears twice with different poses, times that do not overlap, too few pairs.
 PosePairs readPosePairs(const std::string& path_a, const std::string& path_b, const PosePairOptions& options);
+/// The same where the second list of poses is no file; `name_b` stands for it in messages.
+PosePairs readPosePairs(const std::string& path_a, FeatureFile b, const std::string& name_b,
+                        const PosePairOptions& options);
 
 }  // namespace liestat

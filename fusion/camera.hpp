@@ -55,6 +55,7 @@ struct Camera {
   Eigen::Vector4d coefficients = Eigen::Vector4d::Zero();  ///< see Distortion
   int width = 0, height = 0;                               ///< image size in pixels; 0: unknown
   double mirror = 0;                                       ///< ξ of omni
+  double k3 = 0;                                           ///< third radial coefficient of radtan, OpenCV's fifth
 
   /// The pixel (u, v) that sees a point in the camera's axes (any unit of length), whether the image reaches that far
   /// or not. None for a point behind the camera (fisheye lenses see beyond 90 degrees, up to where their image folds
@@ -74,6 +75,7 @@ struct Camera {
 
  private:
   detail::RadialPolynomial radial() const {
+    if (isBentOnPlane() && k3 != 0) return {{coefficients[0], coefficients[1], k3, 0}, 3};
     return {coefficients, distortion == Distortion::none ? 0 : distortion == Distortion::equidistant ? 4 : 2};
   }
   bool hasSphere() const { return distortion > Distortion::equidistant; }
@@ -110,7 +112,7 @@ inline std::optional<Eigen::Vector2d> Camera::project(const Eigen::Vector3d& p) 
     }
     if (!(m.norm() <= detail::farthest_on_plane)) return std::nullopt;
     if (isBentOnPlane()) {
-      const detail::DistortedPoint distorted = detail::distortRadtan(coefficients, m);
+      const detail::DistortedPoint distorted = detail::distortRadtan(coefficients, m, k3);
       if (!(distorted.determinant() > 0) || !radial().ascendsTo(m.norm())) return std::nullopt;
       m = distorted.point;
     }
@@ -131,7 +133,7 @@ inline std::optional<Eigen::Vector3d> Camera::bearing(const Eigen::Vector2d& pix
     const double scale = distance > 0 ? std::sin(*angle) / distance : 0;
     ray = {scale * m.x(), scale * m.y(), std::cos(*angle)};
   } else if (isBentOnPlane()) {
-    const auto plane = detail::undistortRadtan(coefficients, m);
+    const auto plane = detail::undistortRadtan(coefficients, m, k3);
     if (!plane) return std::nullopt;
     ray.head<2>() = *plane;
   }
@@ -160,7 +162,7 @@ inline double Camera::pixelsPerSteradian(const Eigen::Vector3d& bearing) const {
     const detail::SphereLens lens = sphere();
     const double divisor = hasSphere() ? lens.divisor(s, z).value : z;
     area *= (hasSphere() ? lens.growth(s, z) : 1) / (divisor * divisor * divisor);
-    if (isBentOnPlane()) area *= detail::distortRadtan(coefficients, bearing.head<2>() / divisor).determinant();
+    if (isBentOnPlane()) area *= detail::distortRadtan(coefficients, bearing.head<2>() / divisor, k3).determinant();
   }
   return area;
 }

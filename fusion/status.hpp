@@ -72,6 +72,10 @@ enum class FaultKind {
   // Pairs of poses.
   too_few_poses,    ///< index: how many there are
   pose_not_finite,  ///< index: pair
+  // Points that an image shows.
+  too_few_points,   ///< index: how many there are
+  bad_point,        ///< index: point that is not finite, or seen where the camera sees nothing
+  bad_pixel_noise,  ///< the covariance of pixels is not finite, of another size, or not positive definite
   bad_covariance  ///< index: pair with a covariance that is not finite, not symmetric or has a negative eigenvalue, or
                   ///< with two of less than rank six together
 };
@@ -238,6 +242,12 @@ inline std::string describe(const Fault& fault) {
       return at + " pairs of poses are too few";
     case FaultKind::pose_not_finite:
       return "pair " + at + ": a pose is not finite";
+    case FaultKind::too_few_points:
+      return at + " points are too few, four are needed";
+    case FaultKind::bad_point:
+      return "point " + at + ": not finite, or where the camera sees nothing";
+    case FaultKind::bad_pixel_noise:
+      return "the covariance of the pixels is not positive definite, or of another size";
     case FaultKind::bad_covariance:
       return "pair " + at +
              ": a covariance is not symmetric and positive semi-definite, or both together have less than rank 6";

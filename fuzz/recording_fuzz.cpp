@@ -49,6 +49,7 @@ void check(const ImageTracks& tracks) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   mayRefuse([&] { check(parseCalibration(text, "fuzz")); });
+  mayRefuse([&] { check(Calibration{{}, parseCameras(text, "fuzz")}); });
   mayRefuse([&] { (void)parseImuNoise(text, "fuzz"); });
   mayRefuse([&] { check(parseImageTracks(text, "fuzz", {}, {}, 1403715523912143104)); });
   mayRefuse([&] {

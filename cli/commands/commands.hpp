@@ -9,6 +9,7 @@ namespace liestat::cli {
 void addMeanCommand(const CommandList& program);
 void addMotionCommand(const CommandList& program);
 void addPreintegrateCommand(const CommandList& program);
+void addTagPoseCommand(const CommandList& program);
 void addTrackCommand(const CommandList& program);
 void addViInitCommand(const CommandList& program);
 void addTwoViewCommand(const CommandList& program);

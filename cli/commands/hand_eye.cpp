@@ -1,6 +1,8 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/reading_options.hpp>
+#include <cli/commands/target_images.hpp>
 #include <formats/features.hpp>
+#include <formats/images.hpp>
 #include <formats/input_error.hpp>
 #include <formats/pose_pairs.hpp>
 #include <formats/text.hpp>
@@ -34,6 +36,8 @@ struct Options {
   std::vector<double> sigma_a, sigma_b;
   std::vector<std::string> unknowns;
   HandEyeOptions estimate;
+  std::vector<std::string> images;
+  std::string target, calibration, camera, times;
 };
 
 /// The sigmas of a file without covariances: 1 mm and 0.1 degrees, until the residuals tell.
@@ -138,14 +142,80 @@ void requireNoise(const HandEyeOutput& output) {
   }
 }
 
+/// Poses target_T_camera of images; those of `unusable` rows stand for nothing.
+struct PosesOfImages {
+  FeatureFile file;
+  std::vector<bool> usable;
+  std::vector<std::string> notes;
+};
+PosesOfImages posesOfImages(const Options& options) {
+  if (options.target.empty() || options.calibration.empty()) {
+    throw OptionError(command_name, "--images without --target or --calibration", "all three");
+  }
+  const Target target = targetFrom(options.target, command_name);
+  const Camera camera = cameraOf(options.calibration, options.camera);
+  const ImageRecording recording = imagesOf(options.images, options.times);
+  if (!recording.video.empty()) throw InputError(recording.video, 0, "it is no image", "a folder, or images");
+  PosesOfImages result;
+  FeatureFile& file = result.file;
+  file.kind = Feature::frame, file.times = recording.times, file.format = "images";
+  std::vector<std::string> left_out;
+  for (const ImagePose& image : posesInImages(recording.files, target, camera, command_name)) {
+    const PlanarPoseResult& pose = image.target.result;
+    const bool usable = image.none.empty() && pose.ok();
+    result.usable.push_back(usable);
+    if (!usable) left_out.push_back(image.image + ": " + (image.none.empty() ? pose.inWords() : image.none));
+    const SE3d inverse = usable ? pose.pose.mean.inverse() : SE3d();
+    const Eigen::Matrix<double, 6, 6> turned = pose.pose.mean.Adj();
+    file.rotations.emplace_back(inverse.so3().params());
+    file.positions.emplace_back(inverse.translation());
+    file.covariances.emplace_back(usable
+                                      ? Eigen::Matrix<double, 6, 6>(turned * pose.pose.covariance * turned.transpose())
+                                      : Eigen::Matrix<double, 6, 6>::Identity());
+    file.lines.push_back(file.lines.size() + 1);
+  }
+  if (left_out.empty()) return result;
+  result.notes.push_back(fmt::format("{} of {} images are not used", left_out.size(), file.size()));
+  constexpr std::size_t most = 5;
+  for (std::size_t i = 0; i < std::min(most, left_out.size()); ++i) result.notes.push_back("  " + left_out[i]);
+  if (left_out.size() > most) result.notes.push_back(fmt::format("  and {} more", left_out.size() - most));
+  return result;
+}
+/// Pairs of a file and images, without those that give no pose.
+PosePairs pairsWithImages(const Options& options, std::vector<std::string>& notes) {
+  PosesOfImages images = posesOfImages(options);
+  const std::string name =
+      options.images.size() == 1 ? options.images[0] : fmt::format("{} images", images.file.size());
+  PosePairs pairs = readPosePairs(options.file_a, std::move(images.file), name, options.pairs);
+  std::erase_if(pairs.rows, [&](const PoseRows& rows) { return !images.usable[rows.b]; });
+  notes = std::move(images.notes);
+  if (pairs.rows.size() < options.pairs.least) {
+    std::string why;
+    for (const std::string& note : notes) why += "; " + note;
+    throw InputError(name, 0, fmt::format("{} images have a pose of A and one of the target{}", pairs.rows.size(), why),
+                     fmt::format("at least {}", options.pairs.least));
+  }
+  return pairs;
+}
+
 HandEyeOutput calibrate(Options options) {
   options.pairs.reading.angles = options.in_degrees   ? AngleUnit::degrees
                                  : options.in_radians ? AngleUnit::radians
                                                       : AngleUnit::unsaid;
   options.pairs.least = options.relative ? 2 : 3;
   if (!std::isfinite(options.pairs.tolerance)) throw OptionError(command_name, "--tolerance is not finite", "s");
-  PosePairs pairs = readPosePairs(options.file_a, options.file_b, options.pairs);
   HandEyeOutput output;
+  const bool of_images = !options.images.empty();
+  if (of_images == !options.file_b.empty()) {
+    throw OptionError(command_name, of_images ? "a file B and --images" : "no file B", "one of B and --images");
+  }
+  if (of_images && (options.relative || options.invert_b || !options.sigma_b.empty())) {
+    throw OptionError(command_name, "--images with --relative, --invert-b or --sigma-b",
+                      "none of them: images give target_T_camera with its covariance");
+  }
+  PosePairs pairs =
+      of_images ? pairsWithImages(options, output.notes) : readPosePairs(options.file_a, options.file_b, options.pairs);
+  if (of_images) options.file_b = options.images[0];
   output.a = fileOf(pairs.a, options.file_a, options.sigma_a, "--sigma-a", options.invert_a, pairs.unmatched_a);
   output.b = fileOf(pairs.b, options.file_b, options.sigma_b, "--sigma-b", options.invert_b, pairs.unmatched_b);
   output.by_time = pairs.by_time;
@@ -221,7 +291,15 @@ void addHandEyeCommand(const CommandList& program) {
       program.add("hand-eye", "The pose of a camera on a gripper, and of its target, from pairs of poses (AX = YB)");
   command.option("A", options->file_a, "Poses base_T_gripper: TUM, KITTI, EuRoC or CSV ('-': standard input)")
       .required();
-  command.option("B", options->file_b, "Poses target_T_camera, likewise").required();
+  command.option("B", options->file_b, "Poses target_T_camera, likewise; or --images");
+  command
+      .option("--images", options->images,
+              "A folder, or images, of a target: B, with covariances; by times, or by order where there are as many")
+      .list();
+  command.option("--target", options->target, "Of --images: april:36h11:0.05 or chessboard:9x6:0.025");
+  command.option("--calibration", options->calibration, "Of --images: the camera (OpenCV, ROS, Kalibr, EuRoC)");
+  command.option("--camera", options->camera, "Its name, where the calibration has several");
+  command.option("--times", options->times, "Of --images: CSV frame,t_s with a row an image, or EuRoC's cam0/data.csv");
   command.flag("--relative", options->relative,
                "Rows are independent motions of gripper and camera, of two odometries (AX = XB)");
   command.flag("--invert-a", options->invert_a, "A holds gripper_T_base; covariances go with the poses");

@@ -1,7 +1,20 @@
 // Images by OpenCV: a shared module that the program opens when a command needs images (formats/image_library.hpp), so
 // that no other command loads OpenCV.
+#include <fusion/targets/target_pose.hpp>
 #include <fusion/tracking/images.hpp>
 
+#ifdef LIESTAT_HAS_APRILTAG
+#include <apriltag/apriltag.h>
+#include <apriltag/tag16h5.h>
+#include <apriltag/tag25h9.h>
+#include <apriltag/tag36h10.h>
+#include <apriltag/tag36h11.h>
+#include <apriltag/tagStandard41h12.h>
+#include <apriltag/tagStandard52h13.h>
+#endif
+#ifdef LIESTAT_HAS_OPENCV
+#include <opencv2/calib3d.hpp>
+#endif
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -13,6 +26,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <map>
 #include <utility>
 
 namespace liestat {
@@ -163,8 +177,114 @@ class Flow : public PointFlow {
   std::vector<cv::Mat> before_, now_;
 };
 
+#ifdef LIESTAT_HAS_OPENCV
+std::vector<SeenTarget> findChessboard(const cv::Mat& image, const Target& target) {
+  std::vector<cv::Point2f> corners;
+  const cv::Size size(target.columns, target.rows);
+  constexpr int how = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FILTER_QUADS;
+  if (!cv::findChessboardCorners(image, size, corners, how)) return {};
+  SeenTarget seen;
+  for (const cv::Point2f& c : corners) seen.pixels.emplace_back(c.x, c.y);
+  return {seen};
+}
+#endif
+
+#ifdef LIESTAT_HAS_APRILTAG
+struct TagFamily {
+  const char* name;
+  apriltag_family_t* (*create)();
+  void (*destroy)(apriltag_family_t*);
+};
+constexpr TagFamily tag_families[] = {{"16h5", tag16h5_create, tag16h5_destroy},
+                                      {"25h9", tag25h9_create, tag25h9_destroy},
+                                      {"36h10", tag36h10_create, tag36h10_destroy},
+                                      {"36h11", tag36h11_create, tag36h11_destroy},
+                                      {"Standard41h12", tagStandard41h12_create, tagStandard41h12_destroy},
+                                      {"Standard52h13", tagStandard52h13_create, tagStandard52h13_destroy}};
+
+/// A family's tables take a moment to make, and are kept.
+class TagDetector {
+ public:
+  explicit TagDetector(const TagFamily& family)
+      : family_(family.create(), family.destroy), detector_(apriltag_detector_create(), apriltag_detector_destroy) {
+    // Two wrong bits would find tags in noise.
+    apriltag_detector_add_family_bits(detector_.get(), family_.get(), 1);
+    detector_->quad_decimate = 1;
+  }
+
+  std::vector<SeenTarget> find(const cv::Mat& image) const {
+    image_u8_t view{image.cols, image.rows, static_cast<int32_t>(image.step), image.data};
+    const std::unique_ptr<zarray_t, void (*)(zarray_t*)> found(apriltag_detector_detect(detector_.get(), &view),
+                                                               apriltag_detections_destroy);
+    std::vector<SeenTarget> seen;
+    for (int i = 0; i < zarray_size(found.get()); ++i) {
+      apriltag_detection_t* tag = nullptr;
+      zarray_get(found.get(), i, &tag);
+      SeenTarget target;
+      target.id = tag->id;
+      // Its y points down in the tag, and its pixels have their centres at a half.
+      for (const auto& [x, y] : {std::pair(-1., -1.), {1., -1.}, {1., 1.}, {-1., 1.}}) {
+        const auto row = [&, x = x, y = y](unsigned k) {
+          return MATD_EL(tag->H, k, 0) * x + MATD_EL(tag->H, k, 1) * y + MATD_EL(tag->H, k, 2);
+        };
+        target.pixels.emplace_back(row(0) / row(2) - 0.5, row(1) / row(2) - 0.5);
+      }
+      // The library would draw a tag, and Debian's hides the function that frees the image.
+      const int side = family_->total_width, border = family_->width_at_border, first = (side - border) / 2;
+      target.side = side, target.border = border;
+      const auto at = [&](int x, int y) -> std::uint8_t& {
+        return target.cells[static_cast<std::size_t>(y * side + x)];
+      };
+      target.cells.assign(static_cast<std::size_t>(side) * static_cast<std::size_t>(side), 0);
+      // A white ring: outside of a black border, or the border itself.
+      const int low = first - (family_->reversed_border ? 0 : 1), high = side - 1 - low;
+      for (int k = low; k <= high; ++k) at(k, low) = at(k, high) = at(low, k) = at(high, k) = 1;
+      for (unsigned k = 0; k < family_->nbits; ++k) {
+        const bool white = (family_->codes[tag->id] >> (family_->nbits - 1 - k) & 1) != 0;
+        at(first + static_cast<int>(family_->bit_x[k]), first + static_cast<int>(family_->bit_y[k])) = white;
+      }
+      seen.push_back(std::move(target));
+    }
+    return seen;
+  }
+
+ private:
+  std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t*)> family_;
+  std::unique_ptr<apriltag_detector_t, void (*)(apriltag_detector_t*)> detector_;
+};
+
+std::vector<SeenTarget> findTags(const cv::Mat& image, const Target& target, std::string& lacking) {
+  static std::map<std::string, TagDetector> detectors;
+  for (const TagFamily& family : tag_families) {
+    if (target.family != family.name) continue;
+    return detectors.try_emplace(family.name, family).first->second.find(image);
+  }
+  lacking = "the family " + target.family + " of tags is none of";
+  for (const TagFamily& family : tag_families) lacking += std::string(" ") + family.name;
+  return {};
+}
+#endif
+
 class OpenCv : public ImageLibrary {
  public:
+  std::vector<SeenTarget> findTargets(const GreyView& view, const Target& target, std::string& lacking) const override {
+    const cv::Mat image(view.height, view.width, CV_8U, const_cast<std::uint8_t*>(view.pixels),
+                        static_cast<std::size_t>(view.stride));
+    if (target.kind == Target::Kind::april) {
+#ifdef LIESTAT_HAS_APRILTAG
+      return findTags(image, target, lacking);
+#else
+      lacking = "libapriltag-dev when liestat is built";
+#endif
+    } else {
+#ifdef LIESTAT_HAS_OPENCV
+      return findChessboard(image, target);
+#else
+      lacking = "libopencv-calib3d-dev when liestat is built";
+#endif
+    }
+    return {};
+  }
   std::unique_ptr<ImageSequence> openFiles(std::vector<std::string> files) const override {
     return std::make_unique<Files>(std::move(files));
   }

@@ -118,11 +118,11 @@ struct DistortedPoint {
   double determinant() const { return derivative(0, 0) * derivative(1, 1) - derivative(0, 1) * derivative(1, 0); }
 };
 
-/// Distorts a point of the plane at depth one with k1, k2, p1, p2.
-inline DistortedPoint distortRadtan(const Eigen::Vector4d& c, const Eigen::Vector2d& m) {
+/// Distorts a point of the plane at depth one with k1, k2, p1, p2, and k3.
+inline DistortedPoint distortRadtan(const Eigen::Vector4d& c, const Eigen::Vector2d& m, double k3 = 0) {
   const double x = m.x(), y = m.y(), r2 = x * x + y * y;
-  const double factor = 1 + r2 * (c[0] + r2 * c[1]);
-  const double by_r2 = c[0] + 2 * c[1] * r2;
+  const double factor = 1 + r2 * (c[0] + r2 * (c[1] + r2 * k3));
+  const double by_r2 = c[0] + r2 * (2 * c[1] + 3 * r2 * k3);
   DistortedPoint distorted;
   distorted.point = {x * factor + 2 * c[2] * x * y + c[3] * (r2 + 2 * x * x),
                      y * factor + 2 * c[3] * x * y + c[2] * (r2 + 2 * y * y)};
@@ -136,14 +136,15 @@ inline DistortedPoint distortRadtan(const Eigen::Vector4d& c, const Eigen::Vecto
 inline constexpr double farthest_on_plane = 5730;
 
 /// The inverse of distortRadtan on the sheet around the axis, where the map is one to one; none outside its image.
-inline std::optional<Eigen::Vector2d> undistortRadtan(const Eigen::Vector4d& c, const Eigen::Vector2d& target) {
-  const RadialPolynomial radial(c, 2);
+inline std::optional<Eigen::Vector2d> undistortRadtan(const Eigen::Vector4d& c, const Eigen::Vector2d& target,
+                                                      double k3 = 0) {
+  const RadialPolynomial radial({c[0], c[1], k3, 0}, k3 == 0 ? 2 : 3);
   const double distance = target.norm();
   Eigen::Vector2d m = target;
   // The tangential part is small: inverting the radial part alone gives a start within the sheet, where there is one.
   if (const auto r = radial.inverse(distance, farthest_on_plane); r && distance > 0) m *= *r / distance;
   for (int i = 0; i < 50; ++i) {
-    const DistortedPoint distorted = distortRadtan(c, m);
+    const DistortedPoint distorted = distortRadtan(c, m, k3);
     const double determinant = distorted.determinant();
     if (!(determinant > 0)) return std::nullopt;
     const Eigen::Vector2d excess = distorted.point - target;

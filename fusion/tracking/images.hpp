@@ -11,6 +11,9 @@
 
 namespace liestat {
 
+struct Target;      // fusion/targets/target_pose.hpp
+struct SeenTarget;  // likewise
+
 /// A grey image that somebody else holds. Pixel (u, v) is pixels[v * stride + u]; its centre is at (u, v).
 struct GreyView {
   const std::uint8_t* pixels = nullptr;
@@ -57,6 +60,10 @@ class ImageLibrary {
   /// Null where it is no video that can be read.
   virtual std::unique_ptr<ImageSequence> openVideo(const std::string& file) const = 0;
   virtual std::unique_ptr<PointFlow> pointFlow() const = 0;
+  /// Targets of a kind in an image, to some pixels; of another identity, too, and none where there is none. `lacking` is
+  /// what this build lacks to look for them, in words; empty: nothing.
+  virtual std::vector<SeenTarget> findTargets(const GreyView& image, const Target& target,
+                                              std::string& lacking) const = 0;
 };
 
 }  // namespace liestat
