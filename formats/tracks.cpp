@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
+#include <optional>
+#include <set>
 #include <string_view>
 #include <unordered_map>
 #include <utility>
@@ -129,12 +132,39 @@ std::vector<Eigen::Vector3d> readLandmarks(const std::string& path) {
   return landmarks;
 }
 
-std::vector<Eigen::Vector4d> readMatches(const std::string& path) {
-  const NumericTable table = readTable(path, {"x1", "y1", "x2", "y2"});
-  std::vector<Eigen::Vector4d> matches;
-  for (std::size_t i = 0; i < table.rows(); ++i) {
-    matches.emplace_back(table(i, 0), table(i, 1), table(i, 2), table(i, 3));
+Matches readMatches(const std::string& path) {
+  const TextFile file = loadText(path);
+  Matches matches;
+  const NumericTable any = parseTable(file.text, file.name, {}, {"frame", "track"});
+  if (!any.has("frame") || !any.has("track")) {
+    const NumericTable pairs = parseTable(file.text, file.name, {"x1", "y1", "x2", "y2"});
+    for (std::size_t i = 0; i < pairs.rows(); ++i) {
+      matches.points.emplace_back(pairs(i, 0), pairs(i, 1), pairs(i, 2), pairs(i, 3));
+    }
+    return matches;
   }
+  const NumericTable table = parseTable(file.text, file.name, {"frame", "track", "u", "v"}, {"sigma"});
+  const bool has_sigmas = table.has("sigma");
+  const std::size_t sigma = table.column("sigma");
+  std::set<std::size_t> frames;
+  for (std::size_t i = 0; i < table.rows(); ++i) frames.insert(table.index(i, 0));
+  if (frames.size() != 2) {
+    throw InputError(file.name, 0, fmt::format("tracks of {} images", frames.size()), "two, or rows x1,y1,x2,y2");
+  }
+  std::map<std::size_t, std::array<std::optional<std::size_t>, 2>> rows;
+  for (std::size_t i = 0; i < table.rows(); ++i) {
+    std::optional<std::size_t>& row = rows[table.index(i, 1)][table.index(i, 0) == *frames.begin() ? 0 : 1];
+    if (row) throw InputError(file.name, table.line(i), "this frame and track again", "them once");
+    row = i;
+  }
+  double squares = 0;
+  for (const auto& [track, both] : rows) {
+    if (!both[0] || !both[1]) continue;
+    matches.points.emplace_back(table(*both[0], 2), table(*both[0], 3), table(*both[1], 2), table(*both[1], 3));
+    for (const auto& row : both) squares += has_sigmas ? std::pow(sigmaOfTrack(table, *row, sigma), 2) : 0;
+  }
+  if (matches.points.empty()) throw InputError(file.name, 0, "no track is in both images", "tracks of two images");
+  matches.sigma = std::sqrt(squares / (2 * static_cast<double>(matches.points.size())));
   return matches;
 }
 

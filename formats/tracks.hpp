@@ -58,7 +58,13 @@ StereoCamera readStereoCamera(const std::string& path);
 /// Rows `x,y,z` in m: row i is the landmark of track i.
 std::vector<Eigen::Vector3d> readLandmarks(const std::string& path);
 
-/// Rows `x1,y1,x2,y2`: a point in the first image and in the second, px. Throws InputError; `-` is standard input.
-std::vector<Eigen::Vector4d> readMatches(const std::string& path);
+/// Matches of two images.
+struct Matches {
+  std::vector<Eigen::Vector4d> points;  ///< a point in the first image and in the second, px
+  double sigma = 0;                     ///< px: root of the mean of u's and v's variances; 0: not known
+};
+/// Rows `x1,y1,x2,y2`, or the tracks of two images, `frame,track,u,v` and, where known, `sigma`, as `liestat track` has
+/// them. Throws InputError; `-` is standard input.
+Matches readMatches(const std::string& path);
 
 }  // namespace liestat

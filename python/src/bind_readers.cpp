@@ -293,7 +293,7 @@ void bindReaders(py::module_& module) {
   module.def("read_camera_poses", &readCameraPosesFile);
   module.def("read_stereo_camera", &readStereoCameraFile);
   module.def("read_landmarks", [](const std::string& path) { return arrayOfPoints(readLandmarks(path)); });
-  module.def("read_matches", [](const std::string& path) { return arrayOfPoints(readMatches(path)); });
+  module.def("read_matches", [](const std::string& path) { return arrayOfPoints(readMatches(path).points); });
   module.def("read_pose_pairs", &readPosePairFiles);
   module.def("read_two_view_pair", &readTwoViewPairFile);
   module.def("read_two_view_pairs", &readTwoViewPairFiles);
