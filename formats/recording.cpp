@@ -120,7 +120,8 @@ void chooseCalibration(FoundRecording& found, const std::vector<std::string>& fi
     } catch (const InputError& error) {
       if (is_own) throw;
       if (error.line() > 0) {
-        found.notes.push_back(fmt::format("{} is passed over: line {}: {}", found.shortly(file), error.line(), error.found()));
+        found.notes.push_back(
+            fmt::format("{} is passed over: line {}: {}", found.shortly(file), error.line(), error.found()));
       }
       continue;
     }
@@ -128,7 +129,8 @@ void chooseCalibration(FoundRecording& found, const std::vector<std::string>& fi
     if ((camera && !camera_from.empty()) || (imu && !imu_from.empty())) {
       const bool twice = camera && !camera_from.empty();
       found.notes.push_back(fmt::format("{} is passed over: {} has {}, too", found.shortly(file),
-                                        found.shortly(twice ? camera_from : imu_from), twice ? "a camera" : "the noise"));
+                                        found.shortly(twice ? camera_from : imu_from),
+                                        twice ? "a camera" : "the noise"));
       continue;
     }
     if (camera) camera_from = file;
@@ -169,7 +171,8 @@ FoundRecording findRecording(const std::string& folder, const std::string& camer
       files.insert(files.end(), contents.files.begin(), contents.files.end());
     }
   }
-  if (top.images) cameras.emplace_back(nameOf(fs::absolute(found.folder, error).lexically_normal().string()), found.folder);
+  if (top.images)
+    cameras.emplace_back(nameOf(fs::absolute(found.folder, error).lexically_normal().string()), found.folder);
   for (const std::string& sub : top.folders) {
     const FolderContents contents(sub);
     files.insert(files.end(), contents.files.begin(), contents.files.end());
@@ -193,9 +196,8 @@ FoundRecording findRecording(const std::string& folder, const std::string& camer
   found.truth = chooseFile(found, truths, "state_groundtruth_estimate0", "truth");
   // The times of other cameras are none of this one's.
   std::erase_if(times, [&](const std::string& file) {
-    return std::any_of(cameras.begin(), cameras.end(), [&](const auto& c) {
-      return c.first != found.camera && nameOf(parentOf(file)) == c.first;
-    });
+    return std::any_of(cameras.begin(), cameras.end(),
+                       [&](const auto& c) { return c.first != found.camera && nameOf(parentOf(file)) == c.first; });
   });
   if (!found.images.empty()) found.image_times = chooseFile(found, times, found.camera, "times of images");
   chooseCalibration(found, yaml);

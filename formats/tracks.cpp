@@ -157,14 +157,29 @@ Matches readMatches(const std::string& path) {
     if (row) throw InputError(file.name, table.line(i), "this frame and track again", "them once");
     row = i;
   }
-  double squares = 0;
+  std::vector<double> variances;
   for (const auto& [track, both] : rows) {
     if (!both[0] || !both[1]) continue;
     matches.points.emplace_back(table(*both[0], 2), table(*both[0], 3), table(*both[1], 2), table(*both[1], 3));
-    for (const auto& row : both) squares += has_sigmas ? std::pow(sigmaOfTrack(table, *row, sigma), 2) : 0;
+    if (!has_sigmas) continue;
+    const double first = sigmaOfTrack(table, *both[0], sigma), second = sigmaOfTrack(table, *both[1], sigma);
+    variances.push_back((first * first + second * second) / 2);
   }
   if (matches.points.empty()) throw InputError(file.name, 0, "no track is in both images", "tracks of two images");
-  matches.sigma = std::sqrt(squares / (2 * static_cast<double>(matches.points.size())));
+  if (!has_sigmas) return matches;
+  std::vector<double> sorted = variances;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+  const double most = 4 * sorted[sorted.size() / 2];
+  std::size_t kept = 0;
+  double sum = 0;
+  for (std::size_t i = 0; i < variances.size(); ++i) {
+    if (variances[i] > most) continue;
+    sum += variances[i];
+    matches.points[kept++] = matches.points[i];
+  }
+  matches.left_out = variances.size() - kept;
+  matches.points.resize(kept);
+  matches.sigma = std::sqrt(sum / static_cast<double>(kept));
   return matches;
 }
 

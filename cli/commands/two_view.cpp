@@ -138,7 +138,11 @@ int runCommand(Options options, const Invocation& invocation) {
   takeCameras(options, estimate);
   if (options.motions > 1) return runSeveral(options, estimate, {output.file, output.matches, {}}, invocation);
   output.estimate = estimateTwoViewMotion(output.matches, estimate);
-  publishResult(options.json, formatTwoViewMotion(output), invocation.command_line, estimate.search.seed, output);
+  std::string text = formatTwoViewMotion(output);
+  if (matches.left_out > 0) {
+    text += fmt::format("\nnote: {} tracks have more than twice the median sigma and take no part\n", matches.left_out);
+  }
+  publishResult(options.json, text, invocation.command_line, estimate.search.seed, output);
   if (!options.report.empty()) writeTwoViewMotionReport(options.report, invocation.command_line, output);
   return output.estimate.verdict().isNo() ? exit_not_trusted : exit_fine;
 }
@@ -149,7 +153,9 @@ void addTwoViewCommand(const CommandList& program) {
   auto options = std::make_shared<Options>();
   const Command command =
       program.add("two-view", "How the camera moved between two images, from matches of which some may be wrong");
-  command.option("file", options->file, "CSV with the columns x1,y1,x2,y2 (px), or tracks of two images by liestat track; '-' is standard input");
+  command.option(
+      "file", options->file,
+      "CSV with the columns x1,y1,x2,y2 (px), or tracks of two images by liestat track; '-' is standard input");
   command.option("--colmap", options->colmap,
                  "Database of COLMAP in place of a file: all its pairs with matches (needs SQLite)");
   command.option("--output", options->output,

@@ -79,7 +79,8 @@ Sources sourcesOf(const Options& given) {
   }
   if (!options.calibration.empty()) s.calibration = readCalibration(options.calibration);
   const std::vector<CameraCalibration>& cameras = s.calibration.cameras;
-  const bool known = std::any_of(cameras.begin(), cameras.end(), [&](const auto& c) { return c.name == options.camera; });
+  const bool known =
+      std::any_of(cameras.begin(), cameras.end(), [&](const auto& c) { return c.name == options.camera; });
   if (in_folder && options.tracks.empty() && !cameras.empty() && !known) {
     if (isCameraName(s.folder.camera)) take(options.camera, s.folder.camera);
     // The name chose the images.
@@ -143,30 +144,31 @@ void refuseOtherClock(const Sources& s, const ViRecording& recording) {
   const double start = 1e-9 * static_cast<double>(imu.start_ns);
   const double first = s.image_times.front() - start, last = s.image_times.back() - start;
   if (first <= imu.samples.back().time && last >= imu.samples.front().time) return;
-  throw InputError(s.folder.images, 0,
-                   fmt::format("images from {:.3f} to {:.3f} s, none within the readings' {:.3f} to {:.3f} s{}", first,
-                               last, imu.samples.front().time, imu.samples.back().time,
-                               suspectedUnit(imu.start_ns, first)),
-                   "images that the readings cover, on the same clock");
+  throw InputError(
+      s.folder.images, 0,
+      fmt::format("images from {:.3f} to {:.3f} s, none within the readings' {:.3f} to {:.3f} s{}", first, last,
+                  imu.samples.front().time, imu.samples.back().time, suspectedUnit(imu.start_ns, first)),
+      "images that the readings cover, on the same clock");
 }
 
 /// The tracks of a folder's images, kept for the next time.
 void trackRecording(const Sources& s, ViRecording& recording) {
   const Options& options = s.options;
-  const std::string file = trackFile(options.recording, s.folder.images, options.cache,
-                                     options.json.empty() || options.json == "-" ? options.report : options.json,
-                                     command_name);
+  const std::string file =
+      trackFile(options.recording, s.folder.images, options.cache,
+                options.json.empty() || options.json == "-" ? options.report : options.json, command_name);
   const KeptTracks kept = keptTracks(s.folder.images, options.image_times, {}, file, command_name);
   const Camera& camera = recording.camera.camera;
   if (camera.width > 0 && (camera.width != kept.width || camera.height != kept.height)) {
-    throw InputError(s.folder.images, 0, fmt::format("images of {} x {} pixels", kept.width, kept.height),
-                     fmt::format("{} x {}, which {} is calibrated for", camera.width, camera.height,
-                                 recording.camera.name));
+    throw InputError(
+        s.folder.images, 0, fmt::format("images of {} x {} pixels", kept.width, kept.height),
+        fmt::format("{} x {}, which {} is calibrated for", camera.width, camera.height, recording.camera.name));
   }
   recording.tracks = parseImageTracks(kept.text, s.folder.images, "", "", recording.imu.start_ns);
   recording.found.push_back(fmt::format(
       "  tracks       {} in {} images{}", recording.tracks.track_ids.size(), recording.tracks.times.size(),
-      kept.file.empty() ? "" : (kept.from_before ? ", kept from before in " : ", kept in ") + printable(kept.file, 500)));
+      kept.file.empty() ? ""
+                        : (kept.from_before ? ", kept from before in " : ", kept in ") + printable(kept.file, 500)));
   if (!kept.note.empty()) recording.found.push_back("note: " + kept.note);
 }
 

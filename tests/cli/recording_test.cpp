@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -107,7 +108,8 @@ experiments::SimulatedRecording writeRendered(const std::string& folder, std::ui
     const auto state = truthAt(recording.truth, recording.image_times[i]);
     const SE3d world_T_body(state->state.so3(), state->state.translation());
     // Names end in .png as EuRoC's; what a file is its first bytes say.
-    writePgm(folder + "/mav0/cam0/data/" + imageName(recording, i), room.render(world_T_body * recording.camera.imu_T_cam));
+    writePgm(folder + "/mav0/cam0/data/" + imageName(recording, i),
+             room.render(world_T_body * recording.camera.imu_T_cam));
   }
   return recording;
 }
@@ -143,8 +145,8 @@ TEST(Recording, renderedImagesAreInitialised) {
     of_windows += nees, windows += ok, of_stretches += fused, stretches += fusions;
     EXPECT_LT(seconds, 20) << seed;
   }
-  std::printf("%.0f of %.0f windows ok, %.0f recordings exit 0, NEES of windows %.2f of 5, of stretches %.2f of 11\n", windows, all,
-              tested, of_windows / windows, of_stretches / stretches);
+  std::printf("%.0f of %.0f windows ok, %.0f recordings exit 0, NEES of windows %.2f of 5, of stretches %.2f of 11\n",
+              windows, all, tested, of_windows / windows, of_stretches / stretches);
 }
 
 /// A pair of images of a plane, of boxes at many depths, or from one place.
@@ -159,8 +161,8 @@ std::vector<SE3d> pairOf(const std::string& kind, std::mt19937& rng, RenderedRoo
       room.boxes.emplace_back(corner, corner + Eigen::Vector3d(0.6, 0.5, 1));
     }
   }
-  const double baseline = kind == "rotation" ? 0 : 0.15 + 0.1 * std::abs(uniform(rng));
-  const SE3d motion(SO3d::exp(0.06 * vector().normalized()), baseline * vector().normalized());
+  const double baseline = kind == "rotation" ? 0 : 0.05 + 0.05 * std::abs(uniform(rng));
+  const SE3d motion(SO3d::exp(0.03 * vector().normalized()), baseline * vector().normalized());
   return {first, first * motion};
 }
 
@@ -174,12 +176,14 @@ TEST(Recording, renderedPairsHaveTheirModel) {
     const int pairs = isFull() ? 40 : 3;
     for (int pair = 0; pair < pairs; ++pair) {
       const TemporaryDirectory directory;
-      const std::uint32_t seed = (isFull() ? 5000 : 40) + static_cast<std::uint32_t>(pair);
+      const std::uint32_t seed = (isFull() ? 6000 : 40) + static_cast<std::uint32_t>(pair);
       std::mt19937 rng(seed);
       RenderedRoom room({Eigen::Vector3d(-20, -20, -20), Eigen::Vector3d(20, 20, 3)}, camera, 3, seed);
       int image = 0;
-      for (const SE3d& pose : pairOf(kind, rng, room)) writePgm(directory / fmt::format("{}.pgm", image++), room.render(pose));
-      const ProgramOutput tracked = run({"track", directory / "0.pgm", directory / "1.pgm", "--output", directory / "t.csv"});
+      for (const SE3d& pose : pairOf(kind, rng, room))
+        writePgm(directory / fmt::format("{}.pgm", image++), room.render(pose));
+      const ProgramOutput tracked =
+          run({"track", directory / "0.pgm", directory / "1.pgm", "--output", directory / "t.csv"});
       ASSERT_EQ(tracked.exit_code, 0) << tracked.error;
       const ProgramOutput found = run({"two-view", directory / "t.csv", "--intrinsics", "420,420,319.5,239.5",
                                        "--image-size", "640,480", "--json", directory / "out.json"});
@@ -196,6 +200,139 @@ TEST(Recording, renderedPairsHaveTheirModel) {
     EXPECT_GE(right, 0.95 * pairs) << kind;
     EXPECT_LE(wrong_and_ok, 0.05 * pairs) << kind;
   }
+}
+
+class RecordingFolder : public ::testing::Test {
+ protected:
+  RecordingFolder() {
+    setenv("XDG_CACHE_HOME", (directory / "cache").c_str(), 1);
+    recording = writeSensors(folder, 3, 8);
+    const std::vector<std::uint8_t> pixels(640 * 480, 90);
+    for (std::size_t i = 0; i < 8; ++i) writePgm(image(i), {pixels.data(), 640, 480, 640});
+  }
+  std::string image(std::size_t i) const { return folder + "/mav0/cam0/data/" + imageName(recording, i); }
+  /// Sentences of a run that has to end with exit code 2 and leave nothing behind.
+  std::string refused(const Words& more = {}) {
+    const ProgramOutput out = run(Words{"vi-init", folder, "--json", directory / "out.json"} + more);
+    EXPECT_EQ(out.exit_code, 2) << out.output << out.error;
+    EXPECT_FALSE(fs::exists(directory / "out.json"));
+    return out.error;
+  }
+  const TemporaryDirectory directory;
+  const std::string folder = directory / "room";
+  experiments::SimulatedRecording recording;
+};
+
+#define EXPECT_SAYS(text, part) EXPECT_TRUE(contains(text, part)) << (text)
+
+TEST_F(RecordingFolder, saysEachThingThatIsMissing) {
+  for (const char* file : {"imu0/sensor.yaml", "imu0/data.csv", "cam0/sensor.yaml"})
+    fs::remove(folder + "/mav0/" + file);
+  const std::string three = refused();
+  EXPECT_EQ(std::count(three.begin(), three.end(), '\n'), 3) << three;
+  EXPECT_SAYS(three, "there are no readings of an inertial sensor, expected imu0/data.csv");
+  EXPECT_SAYS(three, "no camera is known, expected cam0/sensor.yaml");
+  EXPECT_SAYS(three, "densities of noise are not known, expected imu0/sensor.yaml");
+  fs::remove_all(folder + "/mav0/cam0");
+  EXPECT_SAYS(refused(), "there are no images, expected a folder of them");
+  const ProgramOutput bare = run({"vi-init"});
+  EXPECT_EQ(bare.exit_code, 2);
+  EXPECT_SAYS(bare.error, "there are no readings");
+  fs::remove_all(folder);
+  EXPECT_SAYS(refused(), "there is no such folder");
+  writeOutput(folder, "x");
+  EXPECT_SAYS(refused(), "it is no folder");
+  fs::remove(folder);
+  fs::create_directory(folder);
+  EXPECT_SAYS(refused(), "there are no images");
+}
+
+TEST_F(RecordingFolder, refusesImagesWithASentence) {
+  EXPECT_SAYS(refused(), "no corner was found");
+  const std::string before = contentOf(image(3));
+  writeOutput(image(3), "no image");
+  EXPECT_SAYS(refused(), imageName(recording, 3) + ": it is no image that can be read");
+  const std::vector<std::uint8_t> other(320 * 240, 7);
+  writePgm(image(3), {other.data(), 320, 240, 320});
+  EXPECT_SAYS(refused(), "it has 320 x 240 pixels, expected 640 x 480");
+  writeOutput(image(3), before);
+  const std::string stray = folder + "/mav0/cam0/data/stray.png";
+  writeOutput(stray, before);
+  EXPECT_SAYS(refused(), "stray.png: it has no time in");
+  fs::remove(stray);
+  for (std::size_t i = 1; i < 8; ++i) fs::remove(image(i));
+  EXPECT_SAYS(refused(), "there is one image");
+}
+
+TEST_F(RecordingFolder, refusesOtherClocksNumbersAndCameras) {
+  const std::string imu = folder + "/mav0/imu0/data.csv", text = contentOf(imu);
+  // A year later.
+  std::string later = text;
+  for (std::size_t at = later.find("\n16"); at != std::string::npos; at = later.find("\n16", at + 1))
+    later[at + 2] = '7';
+  writeOutput(imu, later);
+  EXPECT_SAYS(refused(), "none within the readings'");
+  writeOutput(imu, text);
+  EXPECT_SAYS(refused({"--camera", "cam3"}), "no calibration has a camera cam3, expected one of cam0");
+  writeOutput(folder + "/mav0/cam0/sensor.yaml", "sensor_type: camera\nintrinsics: [420, 420]\n");
+  EXPECT_SAYS(refused(), "sensor.yaml:2");
+  // A plain folder, whose images are numbered: without times, then with a gap.
+  const std::string plain = directory / "plain";
+  fs::create_directories(plain + "/left");
+  for (std::size_t i = 0; i < 4; ++i) fs::rename(image(i), plain + fmt::format("/left/{}.png", i));
+  writeOutput(plain + "/readings.csv", text);
+  writeOutput(plain + "/chain.yaml", experiments::calibrationText(recording.camera, sensor));
+  const auto said = [&] { return run({"vi-init", plain}).error; };
+  EXPECT_SAYS(said(), "nothing says when the images were taken");
+  fs::remove(plain + "/left/2.png");
+  EXPECT_SAYS(said(), "image 2 is missing");
+  // A file of times finds them; the camera's name is not the folder's.
+  std::string times = "frame,t_s\n";
+  for (std::size_t i = 0; i < 3; ++i) times += fmt::format("{},{:.6f}\n", i, 1600000000 + recording.image_times[i]);
+  writeOutput(plain + "/times.csv", times);
+  EXPECT_SAYS(said(), "no corner was found");
+}
+
+// Two seconds at 10 Hz, tracked once; what changes is tracked anew, and the recording stays as it is.
+TEST(Recording, tracksAreKeptOutsideOfIt) {
+  const TemporaryDirectory directory;
+  setenv("XDG_CACHE_HOME", (directory / "cache").c_str(), 1);
+  const std::string room = directory / "room";
+  const auto recording = writeRendered(room, 11, 14);
+  const auto filesOf = [](const std::string& folder) {
+    std::vector<std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+      if (entry.is_regular_file()) files.push_back(entry.path().string());
+    }
+    return files;
+  };
+  const std::size_t before = filesOf(room).size();
+  const auto tracked = [&](const Words& more = {}) {
+    return run(Words{"vi-init", room, "--window", "1.2", "--no-refinement"} + more).output;
+  };
+  EXPECT_SAYS(tracked(), ", kept in " + (directory / "cache/liestat/tracks-"));
+  const std::string kept = filesOf(directory / "cache").at(0), content = contentOf(kept);
+  EXPECT_SAYS(tracked(), "kept from before in");
+  // A row that somebody changed, an image that is another, and the options' places.
+  std::string changed = content;
+  changed[changed.size() - 2] ^= 1;
+  writeOutput(kept, changed);
+  EXPECT_SAYS(tracked(), ", kept in ");
+  EXPECT_EQ(contentOf(kept), content);
+  const std::string image = room + "/mav0/cam0/data/" + imageName(recording, 13);
+  fs::last_write_time(image, fs::last_write_time(image) + std::chrono::seconds(1));
+  EXPECT_SAYS(tracked(), ", kept in ");
+  EXPECT_SAYS(tracked({"--cache", directory / "mine"}), ", kept in " + (directory / "mine/tracks-"));
+  EXPECT_SAYS(tracked({"--json", directory / "out.json"}), ", kept in " + (directory / "tracks-"));
+  EXPECT_TRUE(fs::remove(kept));
+  EXPECT_SAYS(tracked({"--json", room + "/out.json"}), ", kept in " + (directory / "cache/liestat/tracks-"));
+  EXPECT_TRUE(fs::remove(room + "/out.json"));
+  EXPECT_SAYS(run({"vi-init", room, "--cache", room + "/mav0/new"}).error, "is within the recording");
+  EXPECT_EQ(filesOf(room).size(), before);
+  // The options go before what is found: these tracks are none of the images'.
+  writeOutput(directory / "t.csv", "frame,track,u,v,t_s\n0,0,1,1,1600000000.01\n1,0,2,2,1600000000.02\n");
+  EXPECT_SAYS(run({"vi-init", room, "--tracks", directory / "t.csv"}).error, "2 images");
+  EXPECT_SAYS(run({"vi-init", room, "--imu", directory / "none.csv"}).error, "none.csv: no such file");
 }
 
 }  // namespace

@@ -44,7 +44,8 @@ class RenderedRoom {
         float sum = 0;
         for (int s = 0; s < sub * sub; ++s) {
           const double x = u + (s % sub + 0.5) / sub - 0.5, y = v + (s / sub + 0.5) / sub - 0.5;
-          sum += seen(at, world_R_camera * Eigen::Vector3d((x - camera_.cu) / camera_.fu, (y - camera_.cv) / camera_.fv, 1));
+          sum += seen(
+              at, world_R_camera * Eigen::Vector3d((x - camera_.cu) / camera_.fu, (y - camera_.cv) / camera_.fv, 1));
         }
         grey[static_cast<std::size_t>(v * width + u)] = sum / (sub * sub);
       }
