@@ -3,6 +3,7 @@
 #include <experiments/recording_files.hpp>
 #include <experiments/simulate_vi.hpp>
 #include <formats/output_file.hpp>
+#include <formats/tracks.hpp>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -32,6 +33,8 @@ using Json = nlohmann::json;
 using testing::RenderedRoom;
 using testing::TexturedBox;
 using testing::writePgm;
+
+#define EXPECT_SAYS(text, part) EXPECT_TRUE(contains(text, part)) << (text)
 
 bool isFull() { return std::getenv("LIESTAT_FULL") != nullptr; }
 
@@ -145,8 +148,18 @@ TEST(Recording, renderedImagesAreInitialised) {
     of_windows += nees, windows += ok, of_stretches += fused, stretches += fusions;
     EXPECT_LT(seconds, 20) << seed;
   }
-  std::printf("%.0f of %.0f windows ok, %.0f recordings exit 0, NEES of windows %.2f of 5, of stretches %.2f of 11\n",
-              windows, all, tested, of_windows / windows, of_stretches / stretches);
+  if (full) {
+    std::printf("%.0f of %.0f windows ok, %.0f recordings exit 0, NEES of windows %.2f of 5, of stretches %.2f of 11\n",
+                windows, all, tested, of_windows / windows, of_stretches / stretches);
+  }
+  ASSERT_GT(windows, 0);
+  ASSERT_GT(stretches, 0);
+  EXPECT_GE(windows, 0.9 * all);
+  // Over the seeds within a factor of two; of one recording what p > 0.001 allows (two windows that share biases).
+  EXPECT_LT(of_windows / windows, full ? 10 : 20.5);
+  EXPECT_GT(of_windows / windows, full ? 2.5 : 0.2);
+  EXPECT_LT(of_stretches / stretches, full ? 22 : 31.3);
+  EXPECT_GT(of_stretches / stretches, full ? 5.5 : 1.5);
 }
 
 /// A pair of images of a plane, of boxes at many depths, or from one place.
@@ -202,6 +215,30 @@ TEST(Recording, renderedPairsHaveTheirModel) {
   }
 }
 
+TEST(Recording, matchesAreTheTracksOfTwoImages) {
+  const TemporaryDirectory directory;
+  const std::string rows = "frame,track,u,v,sigma\n3,1,1,2,0.1\n3,2,3,4,0.1\n3,4,5,6,0.1\n3,6,0,0,0.1\n";
+  const Matches found =
+      readMatches(directory.write("t.csv", rows + "5,4,50,60,0.3\n5,2,30,40,0.1\n5,1,10,20,0.1\n5,9,1,1,0.1\n"));
+  ASSERT_EQ(found.points.size(), 2U);
+  EXPECT_EQ(found.points[0], Eigen::Vector4d(1, 2, 10, 20));
+  EXPECT_EQ(found.points[1], Eigen::Vector4d(3, 4, 30, 40));
+  EXPECT_NEAR(found.sigma, 0.1, 1e-12);
+  EXPECT_EQ(found.left_out, 1U);
+  const auto message = [&](const std::string& more) {
+    try {
+      readMatches(directory.write("t.csv", rows + more));
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_SAYS(message("5,1,1,1,0.1\n7,1,1,1,0.1\n"), "tracks of 3 images, expected two");
+  EXPECT_SAYS(message("5,1,1,1,0.1\n5,1,2,2,0.1\n"), "t.csv:7: this frame and track again");
+  EXPECT_SAYS(message("5,8,1,1,0.1\n"), "no track is in both images");
+  EXPECT_SAYS(message("5,1,1,1,0\n"), "t.csv:6: sigma 0");
+}
+
 class RecordingFolder : public ::testing::Test {
  protected:
   RecordingFolder() {
@@ -222,8 +259,6 @@ class RecordingFolder : public ::testing::Test {
   const std::string folder = directory / "room";
   experiments::SimulatedRecording recording;
 };
-
-#define EXPECT_SAYS(text, part) EXPECT_TRUE(contains(text, part)) << (text)
 
 TEST_F(RecordingFolder, saysEachThingThatIsMissing) {
   for (const char* file : {"imu0/sensor.yaml", "imu0/data.csv", "cam0/sensor.yaml"})
