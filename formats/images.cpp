@@ -29,36 +29,6 @@ constexpr std::size_t most_digits = 9, stamp_digits = 16, largest_stamp_digits =
 
 bool isDigit(char c) { return c >= '0' && c <= '9'; }
 
-bool isImageName(const fs::path& path) {
-  static const std::set<std::string> known = {".png",  ".jpg", ".jpeg", ".bmp", ".tif",
-                                              ".tiff", ".pgm", ".ppm",  ".pnm", ".webp"};
-  std::string ending = path.extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return known.count(ending) > 0;
-}
-
-/// Numbers in names count as numbers.
-bool naturallyBefore(const std::string& a, const std::string& b) {
-  std::size_t i = 0, j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (isDigit(a[i]) && isDigit(b[j])) {
-      while (i < a.size() && a[i] == '0') ++i;
-      while (j < b.size() && b[j] == '0') ++j;
-      std::size_t m = i, n = j;
-      while (m < a.size() && isDigit(a[m])) ++m;
-      while (n < b.size() && isDigit(b[n])) ++n;
-      if (m - i != n - j) return m - i < n - j;
-      if (const int order = a.compare(i, m - i, b, j, n - j); order != 0) return order < 0;
-      i = m, j = n;
-    } else {
-      if (a[i] != b[j]) return a[i] < b[j];
-      ++i, ++j;
-    }
-  }
-  if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
-  return a < b;
-}
-
 std::vector<std::string> filesOf(const std::vector<std::string>& paths) {
   std::vector<std::string> files;
   for (const std::string& path : paths) {
@@ -69,7 +39,7 @@ std::vector<std::string> filesOf(const std::vector<std::string>& paths) {
     std::error_code error;
     for (const fs::directory_entry& entry : fs::directory_iterator(path, error)) {
       std::error_code dangling;
-      if (entry.is_regular_file(dangling) && isImageName(entry.path())) files.push_back(entry.path().string());
+      if (entry.is_regular_file(dangling) && isImageName(entry.path().string())) files.push_back(entry.path().string());
     }
     if (error) throw InputError(path, 0, "it can't be read: " + error.message());
     if (files.empty()) throw InputError(path, 0, "there is no image in it", "two or more (png, jpg, pgm, tif, bmp …)");
@@ -172,6 +142,35 @@ std::vector<double> timesIn(const std::string& path, const std::vector<std::stri
 }
 
 }  // namespace
+
+bool isImageName(const std::string& path) {
+  static const std::set<std::string> known = {".png",  ".jpg", ".jpeg", ".bmp", ".tif",
+                                              ".tiff", ".pgm", ".ppm",  ".pnm", ".webp"};
+  std::string ending = fs::path(path).extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return known.count(ending) > 0;
+}
+
+bool naturallyBefore(const std::string& a, const std::string& b) {
+  std::size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (isDigit(a[i]) && isDigit(b[j])) {
+      while (i < a.size() && a[i] == '0') ++i;
+      while (j < b.size() && b[j] == '0') ++j;
+      std::size_t m = i, n = j;
+      while (m < a.size() && isDigit(a[m])) ++m;
+      while (n < b.size() && isDigit(b[n])) ++n;
+      if (m - i != n - j) return m - i < n - j;
+      if (const int order = a.compare(i, m - i, b, j, n - j); order != 0) return order < 0;
+      i = m, j = n;
+    } else {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i, ++j;
+    }
+  }
+  if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
+  return a < b;
+}
 
 ImageRecording imagesOf(const std::vector<std::string>& paths, const std::string& times) {
   for (const std::string& path : paths) {

@@ -23,6 +23,11 @@ struct ImageRecording {
 /// not fit the images or do not ascend.
 ImageRecording imagesOf(const std::vector<std::string>& paths, const std::string& times);
 
+/// True of a name that ends as images' do (png, jpg, pgm, tif, bmp, webp …).
+bool isImageName(const std::string& path);
+/// Natural order: numbers in names count as numbers, 2 before 10.
+bool naturallyBefore(const std::string& a, const std::string& b);
+
 /// The library of images, in the module liestat_opencv.so beside the program (or in ../lib/liestat): opened at the first
 /// call. Throws InputError in the name of `user` where there is none, with the packages that bring it.
 const ImageLibrary& imageLibrary(const std::string& user);
@@ -43,6 +48,9 @@ class ImageReader {
   double time() const { return time_; }
   /// True of a file that is one of those to read.
   bool reads(const std::string& path) const;
+  /// What is read, as it was given, and which share of it.
+  const std::string& name() const { return name_; }
+  std::size_t every() const { return every_; }
   /// How many images there are, passed-over ones too; 0: not known.
   std::size_t count() const { return recording_.files.empty() ? recording_.times.size() : recording_.files.size(); }
 

@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
+#include <optional>
+#include <set>
 #include <string_view>
 #include <unordered_map>
 #include <utility>
@@ -129,12 +132,54 @@ std::vector<Eigen::Vector3d> readLandmarks(const std::string& path) {
   return landmarks;
 }
 
-std::vector<Eigen::Vector4d> readMatches(const std::string& path) {
-  const NumericTable table = readTable(path, {"x1", "y1", "x2", "y2"});
-  std::vector<Eigen::Vector4d> matches;
-  for (std::size_t i = 0; i < table.rows(); ++i) {
-    matches.emplace_back(table(i, 0), table(i, 1), table(i, 2), table(i, 3));
+Matches readMatches(const std::string& path) {
+  const TextFile file = loadText(path);
+  Matches matches;
+  const NumericTable any = parseTable(file.text, file.name, {}, {"frame", "track"});
+  if (!any.has("frame") || !any.has("track")) {
+    const NumericTable pairs = parseTable(file.text, file.name, {"x1", "y1", "x2", "y2"});
+    for (std::size_t i = 0; i < pairs.rows(); ++i) {
+      matches.points.emplace_back(pairs(i, 0), pairs(i, 1), pairs(i, 2), pairs(i, 3));
+    }
+    return matches;
   }
+  const NumericTable table = parseTable(file.text, file.name, {"frame", "track", "u", "v"}, {"sigma"});
+  const bool has_sigmas = table.has("sigma");
+  const std::size_t sigma = table.column("sigma");
+  std::set<std::size_t> frames;
+  for (std::size_t i = 0; i < table.rows(); ++i) frames.insert(table.index(i, 0));
+  if (frames.size() != 2) {
+    throw InputError(file.name, 0, fmt::format("tracks of {} images", frames.size()), "two, or rows x1,y1,x2,y2");
+  }
+  std::map<std::size_t, std::array<std::optional<std::size_t>, 2>> rows;
+  for (std::size_t i = 0; i < table.rows(); ++i) {
+    std::optional<std::size_t>& row = rows[table.index(i, 1)][table.index(i, 0) == *frames.begin() ? 0 : 1];
+    if (row) throw InputError(file.name, table.line(i), "this frame and track again", "them once");
+    row = i;
+  }
+  std::vector<double> variances;
+  for (const auto& [track, both] : rows) {
+    if (!both[0] || !both[1]) continue;
+    matches.points.emplace_back(table(*both[0], 2), table(*both[0], 3), table(*both[1], 2), table(*both[1], 3));
+    if (!has_sigmas) continue;
+    const double first = sigmaOfTrack(table, *both[0], sigma), second = sigmaOfTrack(table, *both[1], sigma);
+    variances.push_back((first * first + second * second) / 2);
+  }
+  if (matches.points.empty()) throw InputError(file.name, 0, "no track is in both images", "tracks of two images");
+  if (!has_sigmas) return matches;
+  std::vector<double> sorted = variances;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+  const double most = 4 * sorted[sorted.size() / 2];
+  std::size_t kept = 0;
+  double sum = 0;
+  for (std::size_t i = 0; i < variances.size(); ++i) {
+    if (variances[i] > most) continue;
+    sum += variances[i];
+    matches.points[kept++] = matches.points[i];
+  }
+  matches.left_out = variances.size() - kept;
+  matches.points.resize(kept);
+  matches.sigma = std::sqrt(sum / static_cast<double>(kept));
   return matches;
 }
 

@@ -58,7 +58,15 @@ StereoCamera readStereoCamera(const std::string& path);
 /// Rows `x,y,z` in m: row i is the landmark of track i.
 std::vector<Eigen::Vector3d> readLandmarks(const std::string& path);
 
-/// Rows `x1,y1,x2,y2`: a point in the first image and in the second, px. Throws InputError; `-` is standard input.
-std::vector<Eigen::Vector4d> readMatches(const std::string& path);
+/// Matches of two images.
+struct Matches {
+  std::vector<Eigen::Vector4d> points;  ///< a point in the first image and in the second, px
+  double sigma = 0;                     ///< px: root of the mean of u's and v's variances; 0: not known
+  std::size_t left_out = 0;             ///< whose sigma is more than twice the median
+};
+/// Rows `x1,y1,x2,y2`, or the tracks of two images, `frame,track,u,v` and, where known, `sigma`, as `liestat track` has
+/// them: of these, matches that are far less exact than the others are left out, because the estimates of a motion take
+/// one noise for all. Throws InputError; `-` is standard input.
+Matches readMatches(const std::string& path);
 
 }  // namespace liestat

@@ -37,13 +37,12 @@ struct ImuOptions {
   }
 };
 
-/// Declares --imu, --noise, both biases, --scheme and --max-gap. `bias` says what a bias is taken for that is not
-/// given.
-inline void addImuOptions(const Command& command, ImuOptions& options, const std::string& bias) {
-  command
-      .option("--imu", options.file,
-              "EuRoC's imu0/data.csv, CSV with t,wx,wy,wz,ax,ay,az ('-': standard input), or BAG:TOPIC of Imu messages")
-      .required();
+/// Declares --imu, which it returns, --noise, both biases, --scheme and --max-gap. `bias` says what a bias is taken for
+/// that is not given.
+inline Option addImuOptions(const Command& command, ImuOptions& options, const std::string& bias) {
+  Option file = command.option(
+      "--imu", options.file,
+      "EuRoC's imu0/data.csv, CSV with t,wx,wy,wz,ax,ay,az ('-': standard input), or BAG:TOPIC of Imu messages");
   command
       .option("--noise", options.noise,
               "Densities: gyroscope rad/s/rtHz, accelerometer m/s^2/rtHz, and their walks; go before the file's")
@@ -55,6 +54,7 @@ inline void addImuOptions(const Command& command, ImuOptions& options, const std
                             {{"averaged", ImuScheme::averaged}, {"held", ImuScheme::held}, {"cubic", ImuScheme::cubic}},
                             "Integration scheme: averaged (default), held, cubic");
   command.option("--max-gap", options.largest_gap, "s between two readings (default 0.1)").positive();
+  return file;
 }
 
 }  // namespace liestat::cli

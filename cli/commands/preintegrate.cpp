@@ -82,7 +82,7 @@ void addPreintegrateCommand(const CommandList& app) {
   auto options = std::make_shared<Options>();
   const Command command = app.add(
       "preintegrate", "Relative motion, covariance and bias derivatives from the readings of an inertial sensor");
-  addImuOptions(command, options->imu, " (default 0, or the truth's)");
+  addImuOptions(command, options->imu, " (default 0, or the truth's)").required();
   command.option("--calibration", options->calibration, "YAML with the densities of noise (EuRoC, Kalibr, OpenVINS)");
   command.option("--begin", options->begin, "s since the first reading, or the file's seconds (default: the first)");
   command.option("--end", options->end, "The same (default: the last)");

@@ -1,16 +1,13 @@
 #include <cli/commands/commands.hpp>
-#include <cli/show/progress.hpp>
+#include <cli/commands/tracked_images.hpp>
 #include <formats/images.hpp>
 #include <formats/input_error.hpp>
 #include <formats/output_file.hpp>
-#include <fusion/tracking/tracker.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <iterator>
 #include <memory>
 #include <string>
 #include <vector>
@@ -26,51 +23,6 @@ struct TrackCommandOptions {
   std::size_t every = 1;
   TrackerOptions how;
 };
-
-struct TrackedImages {
-  std::size_t images = 0;
-  std::vector<double> times;  ///< s, of each; empty: not known
-  int width = 0, height = 0;
-  std::vector<TrackedPoint> points;
-  std::array<std::size_t, track_ends> ends{};
-};
-
-TrackedImages trackImages(const TrackCommandOptions& options) {
-  ImageReader images(options.paths, options.times, options.every, track_name);
-  if (images.reads(options.output)) {
-    throw OptionError(track_name, "--output " + options.output + ", which is read", "another file");
-  }
-  const std::unique_ptr<PointFlow> flow = imageLibrary(track_name).pointFlow();
-  Tracker tracker(*flow, options.how);
-  TrackedImages result;
-  Progress progress("track", images.count());
-  for (GreyView image = images.next(); image.pixels != nullptr; image = images.next()) {
-    result.width = image.width, result.height = image.height;
-    ++result.images;
-    if (!std::isnan(images.time())) result.times.push_back(images.time());
-    tracker.take(image);
-    progress.advance(options.every);
-  }
-  result.points = tracker.finish();
-  if (result.points.empty()) {
-    throw InputError(options.paths[0], 0, "no corner was found again in another image",
-                     "images with texture that are not black, and overlap");
-  }
-  result.ends = tracker.ends();
-  return result;
-}
-
-/// Rows frame,track,u,v,sigma and, where times are known, t_s.
-std::string csvOf(const TrackedImages& tracked) {
-  const bool times = !tracked.times.empty();
-  std::string text = times ? "frame,track,u,v,sigma,t_s\n" : "frame,track,u,v,sigma\n";
-  for (const TrackedPoint& p : tracked.points) {
-    fmt::format_to(std::back_inserter(text), "{},{},{:.5f},{:.5f},{:.5f}", p.image, p.track, p.u, p.v, p.sigma);
-    if (times) fmt::format_to(std::back_inserter(text), ",{:.9f}", tracked.times[p.image]);
-    text += '\n';
-  }
-  return text;
-}
 
 std::string summaryOf(const TrackedImages& tracked) {
   std::vector<double> sigmas;
@@ -106,9 +58,13 @@ std::string summaryOf(const TrackedImages& tracked) {
 }
 
 int runCommand(const TrackCommandOptions& options) {
-  const TrackedImages tracked = trackImages(options);
+  ImageReader images(options.paths, options.times, options.every, track_name);
+  if (images.reads(options.output)) {
+    throw OptionError(track_name, "--output " + options.output + ", which is read", "another file");
+  }
+  const TrackedImages tracked = trackImages(images, options.how, track_name);
   if (options.output != "-") printLines(summaryOf(tracked));
-  writeOutput(options.output, csvOf(tracked));
+  writeOutput(options.output, tracksText(tracked));
   return exit_fine;
 }
 

@@ -31,6 +31,7 @@ struct Options {
   std::vector<double> intrinsics, second_intrinsics, image_size, verticals;
   std::vector<std::string> nodes;
   std::size_t motions = 1;
+  std::optional<double> sigma = {};
   TwoViewMotionOptions estimate;
 };
 
@@ -123,18 +124,25 @@ int runColmap(const Options& options, const Invocation& invocation) {
   return output.written() == 0 ? exit_not_trusted : exit_fine;
 }
 
-int runCommand(const Options& options, const Invocation& invocation) {
+int runCommand(Options options, const Invocation& invocation) {
+  if (options.sigma) options.estimate.sigma = *options.sigma;
   if (!options.colmap.empty()) return runColmap(options, invocation);
   if (options.file.empty()) throw OptionError(command_name, "nothing to read", "FILE, or --colmap DATABASE");
   if (!options.output.empty()) throw OptionError(command_name, "--output without --colmap", "--json or --report");
   TwoViewMotionOutput output;
   output.file = options.file;
-  output.matches = readMatches(options.file);
   TwoViewMotionOptions estimate = options.estimate;
+  const Matches matches = readMatches(options.file);
+  output.matches = matches.points;
+  if (!options.sigma && matches.sigma > 0) estimate.sigma = matches.sigma;
   takeCameras(options, estimate);
   if (options.motions > 1) return runSeveral(options, estimate, {output.file, output.matches, {}}, invocation);
   output.estimate = estimateTwoViewMotion(output.matches, estimate);
-  publishResult(options.json, formatTwoViewMotion(output), invocation.command_line, estimate.search.seed, output);
+  std::string text = formatTwoViewMotion(output);
+  if (matches.left_out > 0) {
+    text += fmt::format("\nnote: {} tracks have more than twice the median sigma and take no part\n", matches.left_out);
+  }
+  publishResult(options.json, text, invocation.command_line, estimate.search.seed, output);
   if (!options.report.empty()) writeTwoViewMotionReport(options.report, invocation.command_line, output);
   return output.estimate.verdict().isNo() ? exit_not_trusted : exit_fine;
 }
@@ -145,7 +153,9 @@ void addTwoViewCommand(const CommandList& program) {
   auto options = std::make_shared<Options>();
   const Command command =
       program.add("two-view", "How the camera moved between two images, from matches of which some may be wrong");
-  command.option("file", options->file, "CSV with the columns x1,y1,x2,y2 (px); '-' is standard input");
+  command.option(
+      "file", options->file,
+      "CSV with the columns x1,y1,x2,y2 (px), or tracks of two images by liestat track; '-' is standard input");
   command.option("--colmap", options->colmap,
                  "Database of COLMAP in place of a file: all its pairs with matches (needs SQLite)");
   command.option("--output", options->output,
@@ -158,7 +168,9 @@ void addTwoViewCommand(const CommandList& program) {
   command.option("--image-size", options->image_size, "W,H, px (default: the camera's, or the matches' bounding box)")
       .list(2, 2)
       .positive();
-  command.option("--sigma", options->estimate.sigma, "Standard deviation of each image coordinate, px (default 1)")
+  command
+      .option("--sigma", options->sigma,
+              "Standard deviation of each image coordinate, px (default: of the tracks' column sigma, else 1)")
       .range(1e-6, 1e6);
   command
       .option("--outlier-share", options->estimate.search.outlier_share,

@@ -3,7 +3,11 @@
 #include <cli/commands/camera.hpp>
 #include <cli/commands/commands.hpp>
 #include <cli/commands/imu_options.hpp>
+#include <cli/commands/tracked_images.hpp>
+#include <formats/images.hpp>
 #include <formats/input_error.hpp>
+#include <formats/recording.hpp>
+#include <formats/text.hpp>
 #include <cli/commands/validation_command.hpp>
 #include <cli/commands/vi_init_result.hpp>
 #include <cli/show/vi_init.hpp>
@@ -31,7 +35,7 @@ constexpr double default_pixel_noise = 1;
 
 struct Options {
   ImuOptions imu;
-  std::string tracks, image_times, truth, json, report, camera;
+  std::string recording, cache, tracks, image_times, truth, json, report, camera;
   std::vector<std::string> calibration;
   std::vector<double> intrinsics;
   std::optional<FilterConvention> filter_start;
@@ -40,6 +44,80 @@ struct Options {
   std::optional<double> pixel_noise = {};
   VisualInertialOptions how;
 };
+
+/// The files of the options, what a folder adds to them, and what is missing all the same.
+struct Sources {
+  Options options;
+  FoundRecording folder;
+  Calibration calibration;
+  std::vector<double> image_times;   ///< s, of a folder's images
+  std::vector<std::string> missing;  ///< sentences
+};
+
+/// cam0, cam1: names that calibrations have, too.
+bool isCameraName(const std::string& name) {
+  return name.size() > 3 && name.starts_with("cam") && name.find_first_not_of("0123456789", 3) == std::string::npos;
+}
+
+Sources sourcesOf(const Options& given) {
+  Sources s{given, {}, {}, {}, {}};
+  Options& options = s.options;
+  const bool in_folder = !options.recording.empty();
+  const auto take = [](std::string& option, const std::string& file) {
+    if (option.empty()) option = file;
+  };
+  if (in_folder) {
+    s.folder = findRecording(options.recording, options.camera);
+    take(options.imu.file, s.folder.imu), take(options.truth, s.folder.truth);
+    take(options.image_times, s.folder.image_times);
+    if (options.calibration.empty()) options.calibration = s.folder.calibration;
+    // Tracks with times of their own may be of some of the images.
+    if (!options.tracks.empty() && given.image_times.empty() && options.tracks != "-") {
+      const std::string text = loadText(options.tracks).text;
+      if (text.substr(0, text.find('\n')).find("t_s") != std::string::npos) options.image_times.clear();
+    }
+  }
+  if (!options.calibration.empty()) s.calibration = readCalibration(options.calibration);
+  const std::vector<CameraCalibration>& cameras = s.calibration.cameras;
+  const bool known =
+      std::any_of(cameras.begin(), cameras.end(), [&](const auto& c) { return c.name == options.camera; });
+  if (in_folder && options.tracks.empty() && !cameras.empty() && !known) {
+    if (isCameraName(s.folder.camera)) take(options.camera, s.folder.camera);
+    // The name chose the images.
+    if (options.camera == s.folder.camera && !isCameraName(options.camera)) options.camera.clear();
+  }
+
+  const auto lacks = [&](const char* found, const std::string& expected) {
+    s.missing.push_back(errorLine(in_folder ? options.recording : command_name, 0, found, expected));
+  };
+  if (options.imu.file.empty()) {
+    lacks("there are no readings of an inertial sensor",
+          "imu0/data.csv as EuRoC has it or CSV with t,wx,wy,wz,ax,ay,az in the folder, or --imu FILE");
+  }
+  if (options.tracks.empty() && s.folder.images.empty()) {
+    lacks("there are no images",
+          "a folder of them (cam0/data, or the only one in the folder; png, jpg, pgm …), or --tracks FILE");
+  }
+  if (options.tracks.empty() && !s.folder.images.empty()) {
+    s.image_times = imagesOf({s.folder.images}, options.image_times).times;
+    if (s.image_times.empty()) {
+      lacks("nothing says when the images were taken",
+            "names in nanoseconds, cam0/data.csv (ns,file), CSV with frame,t_s in the folder, or --image-times FILE");
+    }
+  }
+  if (cameras.empty() && options.intrinsics.empty()) {
+    lacks("no camera is known",
+          "cam0/sensor.yaml or a chain of Kalibr's in the folder, --calibration FILE with a camera, or --intrinsics "
+          "fu,fv,cu,cv");
+  }
+  const ImuNoise<double> noise = options.imu.noiseOver(s.calibration.imu.value_or(ImuNoise<double>{}));
+  if (!(noise.gyroscope > 0 && noise.accelerometer > 0)) {
+    lacks("the inertial sensor's densities of noise are not known",
+          "imu0/sensor.yaml or a YAML file with imu0 in the folder, --calibration FILE with an imu0, or --noise "
+          "gyroscope,accelerometer");
+  }
+  return s;
+}
 
 CameraCalibration cameraOf(const Options& options, const Calibration& calibration) {
   CameraCalibration camera;
@@ -55,25 +133,79 @@ CameraCalibration cameraOf(const Options& options, const Calibration& calibratio
     camera = *named;
   } else if (!calibration.cameras.empty()) {
     camera = calibration.cameras.front();
-  } else if (options.intrinsics.empty()) {
-    throw OptionError(command_name, "no camera is known", "--calibration with a camera, or --intrinsics fu,fv,cu,cv");
   }
   if (!options.intrinsics.empty()) camera.camera = cameraFromIntrinsics(options.intrinsics);
   return camera;
 }
 
-ViRecording recordingOf(const Options& options) {
+/// Throws an InputError where no image is within the readings: before any is tracked.
+void refuseOtherClock(const Sources& s, const ViRecording& recording) {
+  const ImuFile& imu = recording.imu;
+  const double start = 1e-9 * static_cast<double>(imu.start_ns);
+  const double first = s.image_times.front() - start, last = s.image_times.back() - start;
+  if (first <= imu.samples.back().time && last >= imu.samples.front().time) return;
+  throw InputError(
+      s.folder.images, 0,
+      fmt::format("images from {:.3f} to {:.3f} s, none within the readings' {:.3f} to {:.3f} s{}", first, last,
+                  imu.samples.front().time, imu.samples.back().time, suspectedUnit(imu.start_ns, first)),
+      "images that the readings cover, on the same clock");
+}
+
+/// The tracks of a folder's images, kept for the next time.
+void trackRecording(const Sources& s, ViRecording& recording) {
+  const Options& options = s.options;
+  const std::string file =
+      trackFile(options.recording, s.folder.images, options.cache,
+                options.json.empty() || options.json == "-" ? options.report : options.json, command_name);
+  const KeptTracks kept = keptTracks(s.folder.images, options.image_times, {}, file, command_name);
+  const Camera& camera = recording.camera.camera;
+  if (camera.width > 0 && (camera.width != kept.width || camera.height != kept.height)) {
+    throw InputError(
+        s.folder.images, 0, fmt::format("images of {} x {} pixels", kept.width, kept.height),
+        fmt::format("{} x {}, which {} is calibrated for", camera.width, camera.height, recording.camera.name));
+  }
+  recording.tracks = parseImageTracks(kept.text, s.folder.images, "", "", recording.imu.start_ns);
+  recording.found.push_back(fmt::format(
+      "  tracks       {} in {} images{}", recording.tracks.track_ids.size(), recording.tracks.times.size(),
+      kept.file.empty() ? ""
+                        : (kept.from_before ? ", kept from before in " : ", kept in ") + printable(kept.file, 500)));
+  if (!kept.note.empty()) recording.found.push_back("note: " + kept.note);
+}
+
+/// A folder's findings, one a line.
+void describeFolder(const Sources& s, ViRecording& recording) {
+  const Options& options = s.options;
+  const auto line = [&](const char* what, const std::string& found) {
+    recording.found.push_back(fmt::format("  {:<12} {}", what, found));
+  };
+  const auto shortly = [&](const std::string& path) { return printable(s.folder.shortly(path), 500); };
+  recording.found.push_back(printable(options.recording, 500));
+  if (options.tracks.empty()) {
+    line("images", fmt::format("{} in {}, times {}", s.image_times.size(), shortly(s.folder.images),
+                               options.image_times.empty() ? "by their names" : "of " + shortly(options.image_times)));
+  }
+  line("readings", fmt::format("{} of {}", recording.imu.samples.size(), shortly(options.imu.file)));
+  std::vector<std::string> files;
+  for (const std::string& file : options.calibration) files.push_back(shortly(file));
+  line("calibration", files.empty() ? "none but of the options" : joined(files, ", "));
+  line("truth", options.truth.empty() ? "none: errors are not known" : shortly(options.truth));
+}
+
+ViRecording recordingOf(const Sources& s) {
+  const Options& options = s.options;
   ViRecording recording;
   recording.imu = readImu(options.imu.file);
-  recording.tracks = readImageTracks(options.tracks, options.image_times, recording.imu.start_ns);
-  const Calibration calibration = options.calibration.empty() ? Calibration{} : readCalibration(options.calibration);
-  recording.camera = cameraOf(options, calibration);
-  recording.pose_assumed = calibration.cameras.empty();
-  recording.noise = options.imu.noiseOver(calibration.imu.value_or(ImuNoise<double>{}));
-  if (!(recording.noise.gyroscope > 0 && recording.noise.accelerometer > 0)) {
-    throw OptionError(command_name, "the inertial sensor's densities of noise are not known",
-                      "--calibration with an imu0, or --noise gyroscope,accelerometer");
+  recording.camera = cameraOf(options, s.calibration);
+  recording.pose_assumed = s.calibration.cameras.empty();
+  recording.noise = options.imu.noiseOver(s.calibration.imu.value_or(ImuNoise<double>{}));
+  if (!options.recording.empty()) describeFolder(s, recording);
+  if (options.tracks.empty()) {
+    refuseOtherClock(s, recording);
+    trackRecording(s, recording);
+  } else {
+    recording.tracks = readImageTracks(options.tracks, options.image_times, recording.imu.start_ns);
   }
+  for (const std::string& note : s.folder.notes) recording.found.push_back("note: " + printable(note, 500));
   if (!options.truth.empty()) recording.truth = readGroundTruth(options.truth, recording.imu.start_ns);
   if (options.true_biases && recording.truth.empty()) {
     throw OptionError(command_name, "--true-biases without --truth");
@@ -160,7 +292,12 @@ void refuseFault(const VisualInertialResult& found, const VisualInertialRecordin
 }
 
 int runCommand(const Options& options, const Invocation& invocation) {
-  const ViRecording recording = recordingOf(options);
+  const Sources sources = sourcesOf(options);
+  if (!sources.missing.empty()) {
+    for (const std::string& sentence : sources.missing) std::fputs((sentence + "\n").c_str(), stderr);
+    return exit_bad_input;
+  }
+  const ViRecording recording = recordingOf(sources);
   const VisualInertialRecording measured = measurementsOf(recording, options);
   VisualInertialOptions how = optionsOf(recording, options);
   how.stop = experiments::runStopped;
@@ -198,8 +335,13 @@ void addViInitCommand(const CommandList& app) {
   InitialisationOptions& steps = how.initialisation;
   const Command command =
       app.add("vi-init", "Velocity, gravity and scale from a camera and an inertial sensor, without an initial guess");
+  command.option("RECORDING", options->recording,
+                 "EuRoC's mav0, or a folder with images and a CSV of readings: tracks its images, and finds all files "
+                 "that the options below do not name");
+  command.option("--cache", options->cache,
+                 "Folder that keeps a recording's tracks (default: beside --json or --report, else ~/.cache/liestat)");
   addImuOptions(command, options->imu, ": as it is expected (default 0)");
-  command.option("--tracks", options->tracks, "CSV with frame,track,u,v and, without --image-times, t_s").required();
+  command.option("--tracks", options->tracks, "CSV with frame,track,u,v and, without --image-times, t_s");
   command.option("--image-times", options->image_times, "EuRoC's cam0/data.csv, or CSV with frame,t_s");
   command.option("--calibration", options->calibration,
                  "YAML of camera and inertial sensor (Kalibr, OpenVINS, EuRoC); several files are merged");

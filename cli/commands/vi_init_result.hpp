@@ -6,6 +6,7 @@
 #include <fusion/visual_inertial_truth_types.hpp>
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 namespace liestat::cli {
@@ -18,12 +19,13 @@ struct ViRecording {
   bool pose_assumed = false;  ///< no calibration has the camera's pose on the sensor: it is taken as the identity
   ImuNoise<double> noise;
   std::vector<GroundTruth> truth;  ///< empty: not known
+  std::vector<std::string> found;  ///< in a folder: what was found where, in words, and notes
 };
 template <class V>
 void describe(V& v, const ViRecording& r) {
   v("readings", r.imu.samples.size())("start_ns", r.imu.start_ns, "the time of the first reading", "ns");
   v("images", r.tracks.times.size())("tracks", r.tracks.track_ids.size())("camera_pose_assumed", r.pose_assumed);
-  v("tracks_seen_once", r.tracks.seen_once);
+  v("tracks_seen_once", r.tracks.seen_once)("found", r.found, "in a folder: what was found where");
 }
 
 /// The result that the command shows.

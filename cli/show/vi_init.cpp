@@ -159,7 +159,10 @@ std::string filterStartInWords(const FilterStart& start) {
 
 std::string viInitTable(const ViRecording& recording, const ViInitResult& result) {
   const bool with_truth = !recording.truth.empty();
-  std::string text = windowTable(result, with_truth);
+  std::string text;
+  for (const std::string& line : recording.found) text += line + "\n";
+  if (!recording.found.empty()) text += "\n";
+  text += windowTable(result, with_truth);
   const InitialisationSummary summary = result.summary();
   if (result.windows_left > 0) {
     text += fmt::format("\ninterrupted: {} of {} windows\n", result.windows.size(),

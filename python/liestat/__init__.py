@@ -29,6 +29,7 @@ from ._conversions import (
     write_trajectory,
 )
 from ._files import (
+    find_recording,
     read_calibration,
     read_camera_poses,
     read_features,

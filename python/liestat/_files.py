@@ -89,6 +89,25 @@ def read_features(
     )
 
 
+def find_recording(folder, camera=None):
+    """The files of a recording as it lies on disk: EuRoC's mav0, or images and a CSV of readings (docs/euroc_folder.md).
+
+    Parameters
+    ----------
+    folder : str or path
+    camera : str, optional
+        The name of a folder of images; the first by default.
+
+    Returns
+    -------
+    Result
+        `images` (a folder, for `track`), `image_times`, `imu` (for `read_imu`), `truth` (for `read_ground_truth`), each
+        None where there is none; `calibration` (a list, for `read_calibration`), `camera`, `notes`.
+    """
+    d = _reader("find_recording")(os.fspath(folder), camera or "")
+    return Result("files of a recording", **{name: value if value != "" else None for name, value in d.items()})
+
+
 def read_imu(path):
     """Readings of an inertial sensor from EuRoC's format, CSV with t wx wy wz ax ay az, or a bag ('run.bag:/imu').
 
@@ -235,7 +254,10 @@ def read_landmarks(path):
 
 
 def read_matches(path):
-    """Matches of two images from CSV with x1, y1, x2, y2 (px), shape (n, 4): the argument `matches` of `two_view`."""
+    """Matches of two images from CSV with x1, y1, x2, y2 (px), or from tracks of two images, shape (n, 4).
+
+    They are the argument `matches` of `two_view`.
+    """
     return _reader("read_matches")(os.fspath(path))
 
 

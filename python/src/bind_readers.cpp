@@ -2,6 +2,7 @@
 #include <formats/calibration.hpp>
 #include <formats/features.hpp>
 #include <formats/images.hpp>
+#include <formats/recording.hpp>
 #include <formats/imu.hpp>
 #include <formats/input_error.hpp>
 #include <formats/pose_pairs.hpp>
@@ -293,7 +294,19 @@ void bindReaders(py::module_& module) {
   module.def("read_camera_poses", &readCameraPosesFile);
   module.def("read_stereo_camera", &readStereoCameraFile);
   module.def("read_landmarks", [](const std::string& path) { return arrayOfPoints(readLandmarks(path)); });
-  module.def("read_matches", [](const std::string& path) { return arrayOfPoints(readMatches(path)); });
+  module.def("find_recording", [](const std::string& folder, const std::string& camera) {
+    const FoundRecording found = released([&] { return findRecording(folder, camera); });
+    py::dict d;
+    d["images"] = found.images;
+    d["image_times"] = found.image_times;
+    d["imu"] = found.imu;
+    d["truth"] = found.truth;
+    d["calibration"] = found.calibration;
+    d["camera"] = found.camera;
+    d["notes"] = found.notes;
+    return d;
+  });
+  module.def("read_matches", [](const std::string& path) { return arrayOfPoints(readMatches(path).points); });
   module.def("read_pose_pairs", &readPosePairFiles);
   module.def("read_two_view_pair", &readTwoViewPairFile);
   module.def("read_two_view_pairs", &readTwoViewPairFiles);

@@ -148,6 +148,26 @@ class Files(unittest.TestCase):
         matches = liestat.read_matches(self.write("x1,y1,x2,y2,note", [[1, 2, 3, 4, 0]]))
         np.testing.assert_array_equal(matches, [[1, 2, 3, 4]])
 
+        tracks = [[4, 7, 1, 2, 0.1], [4, 8, 5, 6, 0.1], [9, 7, 3, 4, 0.1], [9, 9, 0, 0, 0.1]]
+        matches = liestat.read_matches(self.write("frame,track,u,v,sigma", tracks))
+        np.testing.assert_array_equal(matches, [[1, 2, 3, 4]])
+
+    def test_recording(self):
+        root = self.path.parent
+        for place in ("cam0/data", "imu0", "left"):
+            (root / "mav0" / place).mkdir(parents=True)
+        (root / "mav0/cam0/data/1600000000000000000.png").write_bytes(b"")
+        (root / "mav0/left/1.jpg").write_bytes(b"")
+        (root / "mav0/imu0/data.csv").write_text("#timestamp [ns]\n1600000000000000000,0,0,0,0,0,9.8\n")
+        found = liestat.find_recording(root)
+        self.assertEqual((found.camera, found.images), ("cam0", str(root / "mav0/cam0/data")))
+        self.assertEqual((found.imu, found.truth), (str(root / "mav0/imu0/data.csv"), None))
+        self.assertEqual((found.image_times, found.calibration), (None, []))
+        self.assertIn("left", found.notes[0])
+        self.assertEqual(liestat.find_recording(root, "left").images, str(root / "mav0/left"))
+        with self.assertRaisesRegex(ValueError, "no such folder"):
+            liestat.find_recording(root / "none")
+
     def test_pairs_of_poses(self):
         a, b = support.features("SE3", 4), support.features("SE3", 4)
         header = "t,qx,qy,qz,qw,tx,ty,tz"

@@ -31,7 +31,7 @@ imu0:
 """
 NOISE = (0.00016968, 0.002, 1.9393e-05, 0.003)
 # Fields that describe the files.
-OF_FILES = ("readings", "start_ns", "images", "tracks", "camera_pose_assumed", "tracks_seen_once")
+OF_FILES = ("readings", "start_ns", "images", "tracks", "camera_pose_assumed", "tracks_seen_once", "found")
 OF_FILES += ("observations_outside",)
 WINDOW_SERIES = ("reason", "velocity", "gravity", "best_gyroscope_bias", "accelerometer_bias", "joint_covariance")
 WINDOW_SERIES += ("scale_sigma", "tilt_sigma", "chi2", "image_indices", "track_names", "inliers", "states")

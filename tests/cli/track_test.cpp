@@ -15,7 +15,7 @@
 #include <vector>
 
 #include <cli/program_output.hpp>
-#include <support/rendered_scene.hpp>
+#include <support/rendered_room.hpp>
 
 namespace liestat::cli {
 namespace {
@@ -23,16 +23,9 @@ namespace {
 using testing::rendered_kinds;
 using testing::RenderedKind;
 using testing::RenderedScene;
+using testing::writePgm;
 
 bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
-
-void writePgm(const std::string& path, const GreyView& image) {
-  std::ofstream file(path, std::ios::binary);
-  file << "P5\n" << image.width << " " << image.height << "\n255\n";
-  for (int v = 0; v < image.height; ++v) {
-    file.write(reinterpret_cast<const char*>(image.pixels + v * image.stride), image.width);
-  }
-}
 
 void write(const std::string& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
 

@@ -287,11 +287,11 @@ TEST(InputsThatFail, OverlaysAndZoomsOfOneAreMarked) {
   }
   const std::string directory = std::string(data) + "/inputs-that-fail/";
   // A third does not move, the rest follows a loose translation.
-  for (const auto& [model, status] : answersOf(readMatches(directory + "zoom_or_none.csv"))) {
+  for (const auto& [model, status] : answersOf(readMatches(directory + "zoom_or_none.csv").points)) {
     EXPECT_NE(model, "zoom");
     EXPECT_NE(status, Status::ok) << model;
   }
-  const auto found = estimateTwoViewMotion(readMatches(directory + "static_overlay.csv"), {});
+  const auto found = estimateTwoViewMotion(readMatches(directory + "static_overlay.csv").points, {});
   EXPECT_EQ(found.status, Status::contested);
   ASSERT_EQ(found.rivals.size(), 1u);
   EXPECT_EQ(found.rivals[0].model, "none");

@@ -65,6 +65,31 @@ class RenderedTexture {
   std::vector<float> values_;
 };
 
+/// Blurs by a Gaussian of so many pixels; borders are repeated.
+inline void smoothImage(std::vector<float>& grey, int width, int height, double sigma) {
+  const int reach = static_cast<int>(std::ceil(3.5 * sigma));
+  std::vector<float> weights;
+  float sum = 0;
+  for (int i = -reach; i <= reach; ++i) {
+    weights.push_back(static_cast<float>(std::exp(-i * i / (2 * sigma * sigma))));
+    sum += weights.back();
+  }
+  for (const bool rows : {true, false}) {
+    std::vector<float> out(grey.size());
+    for (int v = 0; v < height; ++v) {
+      for (int u = 0; u < width; ++u) {
+        float total = 0;
+        for (int i = -reach; i <= reach; ++i) {
+          const int x = rows ? std::clamp(u + i, 0, width - 1) : u, y = rows ? v : std::clamp(v + i, 0, height - 1);
+          total += weights[static_cast<std::size_t>(i + reach)] * grey[static_cast<std::size_t>(y * width + x)];
+        }
+        out[static_cast<std::size_t>(v * width + u)] = total / sum;
+      }
+    }
+    grey = std::move(out);
+  }
+}
+
 /// A camera of 400 px before a plane (occlusion: another one of bounded size nearer to it), image after image.
 class RenderedScene {
  public:
@@ -106,7 +131,7 @@ class RenderedScene {
     const double t = static_cast<double>(image);
     // A lens blurs, too; that of a camera out of focus changes.
     const double blur = kind_ == RenderedKind::blur ? 0.4 + 0.7 * (1 - std::cos(t / 5)) : 0.4;
-    smooth(grey, blur);
+    smoothImage(grey, width_, height_, blur);
     double gain = 1, offset = 0;
     if (kind_ == RenderedKind::light) {
       // 30 % in one image, and as much slowly, over a side of the image to the other.
@@ -154,30 +179,6 @@ class RenderedScene {
     Eigen::Matrix3d camera;
     camera << f, 0, width_ / 2., 0, f, height_ / 2., 0, 0, 1;
     return camera * plane;
-  }
-
-  void smooth(std::vector<float>& grey, double sigma) const {
-    const int reach = static_cast<int>(std::ceil(3.5 * sigma));
-    std::vector<float> weights;
-    float sum = 0;
-    for (int i = -reach; i <= reach; ++i) {
-      weights.push_back(static_cast<float>(std::exp(-i * i / (2 * sigma * sigma))));
-      sum += weights.back();
-    }
-    for (const bool rows : {true, false}) {
-      std::vector<float> out(grey.size());
-      for (int v = 0; v < height_; ++v) {
-        for (int u = 0; u < width_; ++u) {
-          float total = 0;
-          for (int i = -reach; i <= reach; ++i) {
-            const int x = rows ? std::clamp(u + i, 0, width_ - 1) : u, y = rows ? v : std::clamp(v + i, 0, height_ - 1);
-            total += weights[static_cast<std::size_t>(i + reach)] * grey[static_cast<std::size_t>(y * width_ + x)];
-          }
-          out[static_cast<std::size_t>(v * width_ + u)] = total / sum;
-        }
-      }
-      grey = std::move(out);
-    }
   }
 
   RenderedKind kind_;

@@ -95,8 +95,23 @@ class RecordingRun {
       if (w.fault.index < recording_.readings.size()) w.fault_time = recording_.readings[w.fault.index].time;
       return w;
     }
-    findMotion(w, number);
+    const InitialisedWindow measured = w;
+    findMotion(w, number, 1);
     if (options_.refinement) w.refined = refined(w, 1);
+    // The search takes the motion that the readings tell for exact. Where their noise is larger than that of the
+    // bearings, no motion fits these: the search is given more noise, as much as the readings can bring, and what agrees
+    // in the end is judged by the refinement, which knows both.
+    if (!options_.refinement || !options_.consensus) return w;
+    for (double widening = 3; widening * bearing_noise_ < inertialAngle(w); widening *= 3) {
+      const FusionStatus verdict = w.verdict();
+      if (verdict != FusionStatus::no_consensus && verdict != FusionStatus::inconsistent) return w;
+      InitialisedWindow wider = measured;
+      findMotion(wider, number, widening);
+      wider.refined = refined(wider, 1);
+      dropMisfits(wider);
+      if (wider.verdict() != FusionStatus::ok) continue;
+      if (2 * wider.found.inliers.size() >= wider.tracks.size()) return wider;
+    }
     return w;
   }
 
@@ -274,8 +289,44 @@ class RecordingRun {
     return options;
   }
 
-  void findMotion(InitialisedWindow& w, std::size_t number) const {
+  /// rad: the error that the white noise of the readings brings by the end of a window to the bearing of a feature a
+  /// metre away.
+  double inertialAngle(const InitialisedWindow& w) const {
+    const double T = w.end - w.begin, factor = options_.initialisation.inertial_noise_factor;
+    return factor * std::hypot(noise_.gyroscope * std::sqrt(T), noise_.accelerometer * std::sqrt(T * T * T / 3));
+  }
+
+  /// Tracks that a wide search has taken for right and that the refined motion leaves too far for their noise: they go to
+  /// the outliers, and the rest is refined anew.
+  void dropMisfits(InitialisedWindow& w) const {
+    const ConsensusOptions& own = options_.initialisation.consensus;
+    for (std::size_t pass = 0; pass < own.local_passes && w.isRefined() && !w.refined->consistent(); ++pass) {
+      std::vector<std::size_t> kept;
+      for (const std::size_t i : w.found.inliers) {
+        const FeatureTrack& track = w.measured.features[i];
+        double chi2 = 0;
+        for (const TrackedBearing& seen : track) {
+          const SE23d& x = w.refined->states[seen.image];
+          const SE3d body(SO3d(x.so3()), Eigen::Vector3d(x.translation()));
+          const Eigen::Vector3d d = (body * w.measured.cameras[seen.camera]).inverse() * w.refined->features[i];
+          const double sine = d.normalized().cross(seen.bearing.normalized()).norm();
+          chi2 += std::pow(sine / (seen.relative_sigma * bearing_noise_), 2);
+        }
+        const double freedom = 2 * static_cast<double>(track.size()) - 3;
+        const bool fits = chi2 <= freedom + own.misfit_sigmas * std::sqrt(2 * freedom);
+        (fits ? kept : w.found.outliers).push_back(i);
+      }
+      if (kept.size() == w.found.inliers.size() || kept.size() <= own.features_drawn) break;
+      w.found.inliers = std::move(kept);
+      std::sort(w.found.outliers.begin(), w.found.outliers.end());
+      w.refined = refined(w, 1);
+    }
+  }
+
+  /// `widening`: factor of the bearings' noise in the search.
+  void findMotion(InitialisedWindow& w, std::size_t number, double widening) const {
     InitialisationOptions options = optionsOf(w);
+    options.bearing_noise *= widening;
     options.consensus.seed = CounterRng(options.consensus.seed, number)();
     RobustInitialisation& found = w.found;
     found.gyroscope_bias = w.measured.bias().gyroscope;
