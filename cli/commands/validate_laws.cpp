@@ -38,8 +38,9 @@ ValidationView viewOf(const std::vector<LawRow>& rows) {
           .judgement = judgementOfRates(rows),
           .fields = [&rows](JsonObject& object) { object("rows", rows); },
           .head =
-              "Fits of true laws, per cent: ok; of these the location outside of the region, the largest and\n"
-              "the least kappa in their intervals; refuted by the goodness of fit; symmetry rejected at 5 %\n\n",
+              "Fits of true laws, per cent: ok; of these the location outside of the region,\n"
+              "the largest and the least kappa in their intervals; refuted by the goodness\n"
+              "of fit; symmetry rejected at 5 %\n\n",
           .tables = {{.table = tablesOf(columns, rows)}}};
 }
 
