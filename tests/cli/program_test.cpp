@@ -169,9 +169,8 @@ TEST_F(Program, AMistypedWordIsNamedWithTheNearest) {
     return r.errors;
   };
   const std::string commands =
-      "Commands: compare, convert, doctor, evaluate, fit, hand-eye, mean, merge, motion, preintegrate, track, "
-      "two-view, "
-      "vi-init, simulate, validate (liestat --help explains the usage)\n";
+      "Commands: compare, convert, doctor, evaluate, fit, hand-eye, mean, merge, motion, preintegrate, "
+      "tag-pose, track, two-view, vi-init, simulate, validate (liestat --help explains the usage)\n";
   EXPECT_EQ(complaint({"bogus"}), "liestat: bogus is no command. " + commands);
   EXPECT_EQ(complaint({"maen", "f.csv"}), "liestat: maen is no command, did you mean mean? " + commands);
   EXPECT_EQ(complaint({"viinit"}), "liestat: viinit is no command, did you mean vi-init? " + commands);
