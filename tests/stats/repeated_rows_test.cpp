@@ -34,7 +34,9 @@ TEST(RepeatedRows, areFoundWhereAllStandTwice) {
         twice << once, once;
         EXPECT_FALSE(matters(once)) << n << ", " << d << ", " << grid;
         // Of 6000 numbers on a grid of some 600 chance repeats all.
-        if (d > 1 || grid == 0) EXPECT_TRUE(matters(twice)) << n << ", " << d << ", " << grid;
+        if (d > 1 || grid == 0) {
+          EXPECT_TRUE(matters(twice)) << n << ", " << d << ", " << grid;
+        }
       }
     }
   }
