@@ -325,11 +325,11 @@ std::string yamlOfXml(std::string_view text, const std::string& file) {
         list += blank ? (c == '\n' ? '\n' : ' ') : c;
         between = blank && (between || list.find_first_not_of(" \n") != std::string::npos);
       }
-      yaml += "[" + list + "]" + skipped;
+      yaml.append("[").append(list).append("]").append(skipped);
     } else {
       std::string value = content;
       std::replace(value.begin(), value.end(), '"', ' ');
-      yaml += "\"" + value + "\"" + skipped;
+      yaml.append("\"").append(value).append("\"").append(skipped);
     }
     open.pop_back();
     if (!open.empty()) yaml += ",";

@@ -96,6 +96,7 @@ std::string chooseFile(FoundRecording& found, const std::vector<std::string>& fi
   if (files.size() == 1) return files[0];
   if (files.empty()) return {};
   std::vector<std::string> names;
+  names.reserve(files.size());
   for (const std::string& file : files) names.push_back(found.shortly(file));
   found.notes.push_back(fmt::format("none of {} files of {} is used: {}", files.size(), what, joined(names, ", ")));
   return {};

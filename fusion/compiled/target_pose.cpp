@@ -21,7 +21,7 @@ namespace {
 constexpr int lights = 6, largest_fit = 8 + 1 + lights;
 /// The variance of a pixel's own aperture, px².
 constexpr double pixel_variance = 1. / 12;
-constexpr double first_blur = 0.6, least_blur = 0.1, largest_blur = 10;  // px
+constexpr double first_blur = 0.6, largest_blur = 10;  // px
 constexpr int max_steps = 30;
 /// Cells at the rim that are not fitted: what lies beyond the pattern is not known, and is blurred into it.
 constexpr double rim = 0.6;
@@ -42,7 +42,8 @@ struct Cells {
   int columns = 0, rows = 0;
   std::vector<std::uint8_t> white;
   double operator()(int x, int y) const {
-    return white[static_cast<std::size_t>(std::clamp(y, 0, rows - 1) * columns + std::clamp(x, 0, columns - 1))];
+    return white[static_cast<std::size_t>(std::clamp(y, 0, rows - 1)) * static_cast<std::size_t>(columns) +
+                 static_cast<std::size_t>(std::clamp(x, 0, columns - 1))];
   }
 };
 
@@ -163,7 +164,7 @@ class PatternFit {
   /// Undistorted coordinates of cells, and their derivative by the map.
   Eigen::Vector2d place(const Eigen::Vector2d& cell, Eigen::Matrix<double, 2, Eigen::Dynamic>& by_map) const {
     const Eigen::Vector2d region = (cell - middle_) / half_;
-    const Eigen::Vector2d at = (now_.to_region.inverse() * region.homogeneous()).hnormalized();
+    Eigen::Vector2d at = (now_.to_region.inverse() * region.homogeneous()).hnormalized();
     const Eigen::Matrix2d back = derivative(at).inverse();
     by_map.resize(2, map_);
     for (int k = 0; k < map_; ++k) by_map.col(k) = -back * moved(region, k);
@@ -283,7 +284,7 @@ class PatternFit {
       freedom += pull * (1 - std::min(row.dot(inverse * row), 1.));
       const Eigen::Vector2d region = (now_.to_region * s.at.homogeneous()).hnormalized();
       const Eigen::Array2i block = ((region.array() + 1) * blocks / 2).floor().cast<int>().max(0).min(blocks - 1);
-      const auto b = static_cast<std::size_t>(block.y() * blocks + block.x());
+      const auto b = static_cast<std::size_t>(block.y()) * blocks + static_cast<std::size_t>(block.x());
       moves[b] += r * influence;
       parts[b].noalias() += influence * influence.transpose();
     }
