@@ -48,7 +48,7 @@ class ImageReader {
   double time() const { return time_; }
   /// True of a file that is one of those to read.
   bool reads(const std::string& path) const;
-  /// What is read, as it was given, and which share of it.
+  /// The images that are read, as they were given, and which share of them.
   const std::string& name() const { return name_; }
   std::size_t every() const { return every_; }
   /// How many images there are, passed-over ones too; 0: not known.

@@ -144,8 +144,8 @@ LIESTAT_LAWS_API BinghamMoments binghamMoments(const Eigen::VectorXd& mu);
 /// Fits a law to the features in the rows of a matrix with parametersOf(model) columns, whose norms are one to rounding.
 ///
 /// `inconsistent`: the goodness of fit refutes the law (p below refutation_level). `ill_defined`: uniform features would
-/// look like that in one case of a hundred, axes do not tell a girdle from a cluster, the location is open by more than 0.7 rad, or the features are equal to
-/// rounding, so that κ has no bound. `too_few`: fewer than ten features, of rotations 18. `not_applicable`: other columns,
+/// look like that in one case of a hundred, axes do not tell a girdle from a cluster, the location is open by more than
+/// 0.7 rad, or the features are equal to rounding, so that κ has no bound. `too_few`: fewer than ten features, of rotations 18. `not_applicable`: other columns,
 /// or numbers that are not finite. `not_converged`: the iteration of a wrapped normal law.
 LIESTAT_LAWS_API LawFit fitLaw(LawModel model, const Eigen::Ref<const Eigen::MatrixXd>& features,
                                const LawFitOptions& options = {});

@@ -44,7 +44,7 @@ struct SeenTarget {
   int id = -1;
   /// To some pixels: inner corners row by row; or corners of the border (x, y) = (−, −), (+, −), (+, +), (−, +).
   std::vector<Eigen::Vector2d> pixels;
-  /// Of a tag: cells along a side and along the border's side; cells row by row, 0 black and 1 white.
+  /// A tag's cells along a side and along the border's side, and their colours row by row, 0 black and 1 white.
   int side = 0, border = 0;
   std::vector<std::uint8_t> cells;
 };

@@ -203,9 +203,10 @@ LIESTAT_FUSION_INLINE double MotionEngine::planeMisfit(const Evaluation& e) cons
   return degrees > 0 && std::isfinite(rest) ? rest / degrees : std::numeric_limits<double>::infinity();
 }
 
-/// Share of the points that the direction of the best hypothesis puts behind the camera by more than four standard deviations of the
-/// noise that the last frames show, where that is less than the stated one: tracks of other things that move, or of all
-/// that does not where the direction is that of such things. The mean depth does not show them: it follows the near.
+/// Share of the points that the direction of the best hypothesis puts behind the camera, each by four standard
+/// deviations of the noise that the last frames show, where that is less than the stated one. They are tracks of things
+/// that move, or of the scene where the direction is that of such things; the mean depth, which near points decide, does
+/// not show them.
 LIESTAT_FUSION_INLINE double MotionEngine::behindTheCamera(const Evaluation& e) const {
   if (candidates_.size() > 1 || !options_.positive_depth || options_.outliers) return 0;
   std::array<double, fit_frames> fits;
