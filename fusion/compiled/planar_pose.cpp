@@ -126,6 +126,22 @@ class Criterion {
     next_ = pose_ * SE3d::exp(step);
     return true;
   }
+  /// Least squares over the translation and the rotation in the target's plane, from a pose that it moves; χ² there.
+  double settle(SE3d& pose) {
+    for (int pass = 0; pass < 5; ++pass) {
+      start(pose);
+      if (!std::isfinite(linearise())) break;
+      Eigen::Matrix<double, 6, 4> free = Eigen::Matrix<double, 6, 4>::Zero();
+      free.topLeftCorner<3, 3>().setIdentity(), free(5, 3) = 1;
+      const Eigen::Matrix4d information = free.transpose() * information_ * free;
+      const Eigen::Vector4d score = free.transpose() * score_;
+      const Vector6 step = free * information.llt().solve(score);
+      if (!step.allFinite()) break;
+      pose = pose * SE3d::exp(step);
+    }
+    start(pose);
+    return linearise();
+  }
   double costAfterStep() const {
     Eigen::VectorXd r;
     return residuals(next_, r) ? r.squaredNorm() : std::numeric_limits<double>::infinity();
@@ -224,6 +240,14 @@ SE3d mirrored(const SE3d& pose, const PlanarView& view, const std::vector<Eigen:
   for (int k = 0; k < 2; ++k) rotation.col(k) -= 2 * sight * sight.dot(rotation.col(k));
   rotation.col(2) = rotation.col(0).cross(rotation.col(1));
   return poseFrom(rotation, translationFor(rotation, view, bearings));
+}
+
+/// The pose with the plane turned about the target's centre until it faces the camera.
+SE3d turnedTo(const SE3d& pose, const Eigen::Vector3d& sight, const Eigen::Vector2d& centre) {
+  const Eigen::Matrix3d R = pose.so3().matrix();
+  const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(R.col(2), sight);
+  const Eigen::Matrix3d turned = turn.toRotationMatrix() * R;
+  return poseFrom(turned, sight - turned * Eigen::Vector3d(centre.x(), centre.y(), 0));
 }
 
 /// Relative curvatures at a minimum (Bates and Watts, 1980), by second differences along whitened directions.
@@ -371,6 +395,19 @@ PlanarPoseResult estimatePlanarPose(const PlanarView& view, const Camera& camera
     return covariance;
   };
   result.pose.covariance = covarianceOf(minima[0], result.curvature);
+  // Between the two minima the plane faces the camera, and there the model is curved most. Where noise may have moved the
+  // minimum away from there, that it is straight at the minimum is chosen by the error.
+  if (result.pose.covariance.allFinite()) {
+    Minimum facing{turnedTo(minima[0].pose, sight, centre), 0, {}};
+    facing.chi2 = criterion.settle(facing.pose), facing.information = criterion.information();
+    if (facing.chi2 - minima[0].chi2 < 2 * std::log(min_likelihood_ratio)) {
+      const RelativeCurvature there = curvatureAt(criterion, facing, criterion.design());
+      if (!(there.parameter + there.intrinsic <= max_pose_curvature)) {
+        result.curvature = there;
+        result.pose.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
+      }
+    }
+  }
   if (minima.size() > 1) {
     RelativeCurvature its_own;
     result.rival = Gaussian<SE3d>{minima[1].pose, covarianceOf(minima[1], its_own)};
