@@ -8,7 +8,8 @@
 // exp((χ²(rival) − χ²(T))/2); below 10⁴ nothing tells the two apart that may be relied upon.
 //
 // χ² has 2n − 6 degrees of freedom and tests Σ, the camera and the plane. Where the model is curved on the scale of the
-// noise (small targets that face the camera) the covariance of first order does not hold, and is withheld.
+// noise (small targets that face the camera) the covariance of first order does not hold, and is withheld; so it is where
+// the plane may face the camera and the model is curved there.
 #pragma once
 
 #include <fusion/camera.hpp>
